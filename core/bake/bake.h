@@ -1,0 +1,148 @@
+#pragma once
+
+// The front door. One object holds the decoded inputs and the BVH of a job; its three steps are
+// pure functions: plan(spec, inputs), chunk(spec, plan, range) -> bytes, assemble(spec, plan, all
+// bytes).
+//
+//   Bake bake(spec, inputs, grants);
+//   Plan plan = bake.plan(progress);
+//   for (range : plan.chunks) results.push_back(bake.chunk(plan, range, progress));
+//   Assembly result = bake.assemble(plan, results, progress);
+//
+// bake_all() does exactly that in one call.
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/bake/plan.h"
+#include "core/base/progress.h"
+#include "core/image/image.h"
+#include "core/sphere/harmonics.h"
+
+namespace lightkiln {
+
+// The bytes behind a spec's digests.
+struct Inputs {
+  std::map<std::string, std::span<const std::byte>> blobs;  // by digest "sha256:..."
+};
+
+struct ChunkResult {
+  std::vector<std::byte> bytes;  // a pure function of (engine, ISA, spec, plan, range)
+  ChunkReport report;
+};
+
+struct Artifact {
+  std::string name;        // file name, unique in the job: "ambient_occlusion.glb"
+  std::string role;        // "glb", "image", "table"
+  std::string media_type;  // "model/gltf-binary", "image/x-exr"
+  std::vector<std::byte> bytes;
+};
+
+// Documents that the service writes as JSON; core knows no JSON.
+
+struct AoMeshIndex {
+  std::string name;
+  int node = -1, mesh = -1, primitive = -1;
+  uint64_t first = 0;  // into the strip, in vertices
+  uint64_t count = 0;
+  double mean = 0, min = 0, max = 0;
+};
+struct AoDocument {
+  std::vector<AoMeshIndex> meshes;
+  uint64_t vertices = 0;
+  double mean = 0, min = 0, max = 0;
+  double error_rms = 0, error_max = 0;
+  int strip_width = 0, strip_height = 0;  // pixel i of the EXR strip is vertex i, row by row
+};
+
+// Six directions with the RGB that evaluating the coefficients there must give, so that an importer
+// can prove itself.
+struct ShSelftest {
+  Vec3d direction;
+  Vec3d radiance;
+  Vec3d irradiance;
+};
+struct ShDocument {
+  ShRgb sh;
+  std::vector<ShSelftest> selftest;
+  double error = 0;  // bound or 95 % half-width, relative to L00
+};
+std::vector<ShSelftest> make_selftest(const ShRgb& sh);
+
+struct PrefilterLevel {
+  std::string artifact;
+  int size = 0;
+  double roughness = 0;
+  double error_bound = 0;  // relative to the level's mean
+};
+struct EnvironmentDocument {
+  int source_width = 0, source_height = 0;
+  std::string source_format;
+  PixelRepairs repairs;
+  Vec3d mean;
+  double max_luminance = 0;
+  std::vector<ShDocument> sh;  // none or one
+  std::vector<PrefilterLevel> prefilter;
+  std::string irradiance_artifact;
+  int irradiance_size = 0;
+  double irradiance_error_bound = 0;  // relative to the mean irradiance
+  std::string dfg_artifact;
+  int dfg_size = 0;
+  double dfg_error_bound = 0;
+};
+
+enum class ProbeStatus { valid, inside_geometry, on_surface };
+const char* probe_status_name(ProbeStatus status);
+struct ProbeDocument {
+  uint64_t index = 0;
+  Vec3d position;
+  ProbeStatus status = ProbeStatus::valid;
+  double backface_share = 0;  // share of nearest hits that meet a back face
+  double distance_mean = 0;   // world units, over directions that hit; 0 when none does
+  double distance_min = 0;
+  double hit_share = 0;
+  double error = 0;  // 95 % half-width, relative to the job's mean luminance
+  AccuracyStatus accuracy = AccuracyStatus::converged;
+  ShDocument sh;
+  std::string radiance_artifact;
+  std::string distance_artifact;
+};
+struct ProbesDocument {
+  std::vector<ProbeDocument> probes;
+  int cubemap_size = 0;
+};
+
+struct Assembly {
+  std::vector<Artifact> artifacts;
+  std::variant<AoDocument, EnvironmentDocument, ProbesDocument> document;
+  AccuracyRecord accuracy;
+};
+
+class Bake {
+ public:
+  // Decodes the inputs and builds what rays need. Throws Error.
+  Bake(const Spec& spec, const Inputs& inputs, const Grants& grants);
+  ~Bake();
+  Bake(Bake&&) noexcept;
+  Bake& operator=(Bake&&) noexcept;
+
+  // Runs a pilot and prices the order.
+  Plan plan(Progress& progress);
+  ChunkResult chunk(const Plan& plan, const ElementRange& range, Progress& progress);
+  // `chunks` in the order of plan.chunks.
+  Assembly assemble(const Plan& plan, std::span<const ChunkResult> chunks, Progress& progress);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+Assembly bake_all(const Spec& spec, const Inputs& inputs, const Grants& grants, Progress& progress,
+                  Plan* plan_out = nullptr);
+
+}  // namespace lightkiln

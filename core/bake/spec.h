@@ -1,0 +1,129 @@
+#pragma once
+
+// What a client orders. Every field states its default, unit, range, what zero or "none" means, and
+// what raising it costs. The same names, defaults and ranges stand in proto/openapi.json and in the
+// field tables of proto/json; a test holds the three together.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/base/math.h"
+
+namespace lightkiln {
+
+enum class Falloff {
+  none,         // a hit counts fully at any distance: mu = 0
+  linear,       // mu = t, t = distance / max_distance
+  quadratic,    // mu = t^2
+  smooth,       // mu = 3 t^2 - 2 t^3
+  exponential,  // mu = 1 - exp(-distance / falloff_distance)
+};
+enum class Distribution { cosine, uniform };
+enum class AoTarget { vertices };
+
+struct AmbientOcclusionParameters {
+  AoTarget target = AoTarget::vertices;
+  // World units, > 0. None = infinite. Shorter is cheaper. linear, quadratic and smooth need one.
+  std::optional<double> max_distance;
+  Falloff falloff = Falloff::none;
+  // World units, > 0. Required by `exponential`, refused otherwise.
+  std::optional<double> falloff_distance;
+  Distribution distribution = Distribution::cosine;
+};
+
+// Each product is made only when ordered.
+struct ShOutput {
+  int bands = 3;  // 1..33; cost grows with bands^2
+};
+struct IrradianceOutput {
+  int size = 64;  // texels a face side, 1..1024; cost grows with size^2
+};
+struct PrefilterOutput {
+  int size = 256;  // texels a face side of level 0, power of two, 8..2048
+  int levels =
+      5;  // 2..12, size >> (levels - 1) >= 1; roughness is linear from 0 to 1 over the levels
+};
+struct DfgOutput {
+  int size = 128;  // texels a side, 8..1024
+};
+
+struct EnvironmentMapsParameters {
+  std::optional<ShOutput> sh;
+  std::optional<IrradianceOutput> irradiance;
+  std::optional<PrefilterOutput> prefilter;
+  std::optional<DfgOutput> dfg;
+  // At least one of the four is ordered.
+};
+
+struct CubemapOutput {
+  int size = 64;  // texels a face side, 1..512; cost grows with size^2
+};
+
+struct ProbesParameters {
+  std::vector<Vec3d> positions;  // world units, 1..10000 positions
+  CubemapOutput cubemap;
+  ShOutput sh;
+  // Diffuse bounces, 0..64: 0 = only light that surfaces emit or the environment sends directly to
+  // the probe. None = the fewest whose truncation bound stays under half the ordered error.
+  std::optional<int> max_bounces;
+};
+
+enum class Kind { ambient_occlusion, environment_maps, probes };
+inline constexpr Kind kKinds[] = {Kind::ambient_occlusion, Kind::environment_maps, Kind::probes};
+const char* kind_name(Kind kind);
+
+// A blob by its digest "sha256:<64 hex>", or a .gltf with the blobs that its URIs name.
+struct InputRef {
+  std::string blob;
+  std::vector<std::pair<std::string, std::string>> resources;  // (URI, digest), sorted by URI
+};
+
+struct Accuracy {
+  // 95 % confidence half-width per element: absolute for ambient occlusion, relative to the job's
+  // mean luminance for radiance. > 0, <= 1. None = the kind's default (0.02, 0.001, 0.05). Halving
+  // it costs about 2.6 times the time where shadows have edges, 4 times where noise is independent.
+  std::optional<double> target_error;
+  // Samples per element and texel at the most, rounded up to a power of two; 64..1048576. None =
+  // 65536.
+  std::optional<uint64_t> max_samples;
+  // CPU-independent promise: wall seconds that the plan may predict for baking, > 0. It pins a
+  // sample count before baking starts. None = no limit.
+  std::optional<double> max_seconds;
+};
+
+struct Spec {
+  std::optional<InputRef> scene;        // ambient_occlusion and probes: required
+  std::optional<InputRef> environment;  // environment_maps: required; probes: optional (black)
+  std::variant<AmbientOcclusionParameters, EnvironmentMapsParameters, ProbesParameters> parameters;
+  Accuracy accuracy;
+  uint64_t seed = 0;  // random streams are a pure function of it
+
+  Kind kind() const { return static_cast<Kind>(parameters.index()); }
+};
+
+double default_target_error(Kind kind);
+double target_error(const Spec& spec);
+uint64_t max_samples(const Spec& spec);
+
+// A fault of a spec at a JSON pointer relative to the spec's root.
+struct SpecFault {
+  std::string pointer;
+  std::string code;     // missing | unknown | type | range | conflict
+  std::string message;  // one sentence: what is wrong and what is allowed
+};
+
+// Every fault that can be told without opening a file; empty when the spec can be ordered.
+std::vector<SpecFault> validate(const Spec& spec);
+
+// What an operator grants; never part of a spec.
+struct Grants {
+  int threads = 0;                // 0 = one per processor
+  uint64_t max_memory_bytes = 0;  // 0 = no limit
+  uint64_t max_rays_per_element = 1u << 26;
+  double chunk_seconds = 4.0;  // work aimed at per chunk
+};
+
+}  // namespace lightkiln

@@ -1,0 +1,38 @@
+#pragma once
+
+// Draws directions in proportion to an environment's luminance, exactly: a texel by its luminance
+// times its true solid angle, then a point of its spherical rectangle uniform in solid angle.
+
+#include <cstdint>
+#include <vector>
+
+#include "core/environment/environment.h"
+
+namespace lightkiln {
+
+class EnvironmentSampler {
+ public:
+  explicit EnvironmentSampler(const Environment& environment);
+
+  struct Sample {
+    Vec3 direction;
+    Vec3 radiance;
+    float pdf = 0;  // per steradian; always > 0
+  };
+  // u, v in [0, 1).
+  Sample sample(float u, float v) const;
+  // The density with which sample() returns `direction`.
+  float pdf(const Vec3& direction) const;
+
+  // True when the map holds no light: the density is then uniform, 1/(4 pi).
+  bool black() const { return black_; }
+
+ private:
+  const Environment* environment_;
+  bool black_ = false;
+  std::vector<double> row_cdf_;    // height + 1
+  std::vector<double> texel_cdf_;  // height rows of width + 1, each row normalised
+  double texel_pdf(int x, int y) const;
+};
+
+}  // namespace lightkiln

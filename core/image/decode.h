@@ -1,0 +1,25 @@
+#pragma once
+
+// Any image a client may send as light: chooses the reader by the file's first bytes.
+
+#include <cstddef>
+#include <span>
+
+#include "core/image/exr.h"
+
+namespace lightkiln {
+
+// OpenEXR or Radiance HDR. Throws Error{invalid_input} that names what was found instead.
+DecodedImage decode_hdr_image(std::span<const std::byte> bytes);
+
+// Sets NaN, infinite and negative values to 0 and counts them by kind.
+PixelRepairs sanitise(Image& image);
+
+// An exposure in stops, then the Khronos PBR neutral tone curve (Khronos Group 2024), then sRGB.
+struct TonemapOptions {
+  double exposure_stops = 0.0;
+};
+struct Image8;
+Image8 tonemap(const Image& image, const TonemapOptions& options);
+
+}  // namespace lightkiln

@@ -1,0 +1,42 @@
+#pragma once
+
+// OpenEXR in and out, from and to memory. The only user of OpenEXR.
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/image/image.h"
+
+namespace lightkiln {
+
+struct DecodedImage {
+  Image image;                                     // linear Rec. 709, 1 or 3 channels
+  EnvmapAttribute envmap = EnvmapAttribute::none;  // what the file says of its layout
+  std::string format;                              // "OpenEXR, 32-bit float, ZIP", for reports
+};
+
+enum class ExrPixelType { half, float32 };
+
+struct ExrWriteOptions {
+  ExrPixelType pixel_type = ExrPixelType::half;  // half refuses values above 65504: see write_exr
+  EnvmapAttribute envmap = EnvmapAttribute::none;
+  // Text attributes, written in key order. No time stamp: equal pixels give equal bytes.
+  std::map<std::string, std::string> attributes;
+};
+
+// Reads scan-line or tiled files of any compression; of a multi-part file the first part with R, G,
+// B or Y. Throws Error: invalid_input when malformed, unsupported when deep, too_large above 16384
+// pixels a side or 67,108,864 pixels. NaN, infinite and negative values are returned as stored.
+DecodedImage read_exr(std::span<const std::byte> bytes);
+
+// Writes a single-part scan-line ZIP file with channels R, G, B (A) or Y, chromaticities of Rec.
+// 709. With `half`, a value that half cannot hold (above 65504) makes the whole file 32-bit float;
+// the result says which was written through `written` when it is not null.
+std::vector<std::byte> write_exr(const Image& image, const ExrWriteOptions& options,
+                                 ExrPixelType* written = nullptr);
+
+}  // namespace lightkiln

@@ -1,0 +1,52 @@
+#pragma once
+
+// Pixels in memory: linear, 32-bit float, interleaved, top row first.
+
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/base/math.h"
+
+namespace lightkiln {
+
+struct Image {
+  int width = 0;
+  int height = 0;
+  int channels = 0;           // 1 (Y), 3 (R, G, B) or 4 (R, G, B, A)
+  std::vector<float> pixels;  // [(y * width + x) * channels + channel]
+
+  Image() = default;
+  Image(int width_, int height_, int channels_)
+      : width(width_),
+        height(height_),
+        channels(channels_),
+        pixels(static_cast<size_t>(width_) * static_cast<size_t>(height_) *
+               static_cast<size_t>(channels_)) {}
+
+  size_t offset(int x, int y) const {
+    assert(x >= 0 && x < width && y >= 0 && y < height);
+    return (static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)) *
+           static_cast<size_t>(channels);
+  }
+  float* at(int x, int y) { return pixels.data() + offset(x, y); }
+  const float* at(int x, int y) const { return pixels.data() + offset(x, y); }
+  Vec3 rgb(int x, int y) const {
+    const float* p = at(x, y);
+    return channels >= 3 ? Vec3{p[0], p[1], p[2]} : Vec3{p[0], p[0], p[0]};
+  }
+};
+
+// What was repaired while reading, counted by kind. Nothing is repaired silently.
+struct PixelRepairs {
+  uint64_t nan = 0;       // set to 0
+  uint64_t infinite = 0;  // set to 0
+  uint64_t negative = 0;  // set to 0
+};
+
+// The layout a file claims through OpenEXR's `envmap` attribute.
+enum class EnvmapAttribute { none, latlong, cube };
+
+}  // namespace lightkiln

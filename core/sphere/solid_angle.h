@@ -1,0 +1,19 @@
+#pragma once
+
+// Exact solid angles, in steradians.
+
+#include <vector>
+
+namespace lightkiln {
+
+// Texel (x, y) of a face of a cube with `size` texels a side. The six faces sum to 4 pi within
+// 1e-12.
+double cube_texel_solid_angle(int x, int y, int size);
+
+// Any texel of row y of a lat-long image; all rows times their widths sum to 4 pi within 1e-12.
+double latlong_texel_solid_angle(int y, int width, int height);
+
+// A cone of half-angle a: 4 pi sin^2(a/2), which does not cancel for a small sun.
+double cap_solid_angle(double half_angle_rad);
+
+}  // namespace lightkiln
