@@ -1,0 +1,57 @@
+// Error against time, both logarithmic, with the ordered error as a line.
+
+import uPlot from "/uPlot.esm.js";
+
+// points: [{seconds, error}] in rising seconds, all above zero. Returns the plot's element.
+export function errorPlot(container, points, target) {
+  container.replaceChildren();
+  const x = points.map((point) => point.seconds);
+  const measured = points.map((point) => point.error);
+  const line = points.map(() => target);
+  const options = {
+    width: Math.max(360, Math.min(760, container.clientWidth - 24)),
+    height: 320,
+    scales: {
+      x: { time: false, distr: 3 },
+      y: { distr: 3, range: (_plot, low, high) => padLog(Math.min(low, target), Math.max(high, target)) },
+    },
+    axes: [
+      { label: "seconds of baking", values: (_plot, ticks) => ticks.map(plain) },
+      { label: "error (rms of 95 % half-widths)", size: 70, values: (_plot, ticks) => ticks.map(plain) },
+    ],
+    series: [
+      { label: "seconds", value: (_plot, value) => plain(value) },
+      {
+        label: "error",
+        stroke: "#0b57a8",
+        width: 2,
+        points: { show: true, size: 8 },
+        value: (_plot, value) => plain(value),
+      },
+      { label: "ordered", stroke: "#a3211b", dash: [6, 4], width: 1.5, points: { show: false } },
+    ],
+  };
+  const plot = new uPlot(options, [x, measured, line], container);
+  container.dataset.points = String(points.length);
+  return plot;
+}
+
+function plain(value) {
+  if (value === null || value === undefined) return "";
+  return Number(value.toPrecision(2)).toString();
+}
+
+function padLog(low, high) {
+  return [low / 1.5, high * 1.5];
+}
+
+// Rounds as the API gives them, as points of rising seconds; rounds without an error are left out.
+export function pointsOfRounds(rounds) {
+  const points = [];
+  let elapsed = 0;
+  for (const round of rounds ?? []) {
+    elapsed += round.wall_s;
+    if (round.error_rms > 0 && elapsed > 0) points.push({ seconds: elapsed, error: round.error_rms });
+  }
+  return points;
+}
