@@ -34,6 +34,13 @@ struct Bounds {
   Vec3d extent() const { return empty() ? Vec3d{} : upper - lower; }
 };
 
+// Enlarges `bounds` to hold the point.
+void grow(Bounds& bounds, const Vec3d& point);
+
+// Centre: the middle of the box. Exponent: the one that brings the longest side of the box into
+// [0.5, 1); 0 for a box without extent. The identity for an empty box.
+Normalisation make_normalisation(const Bounds& world);
+
 enum class WrapMode { repeat, mirrored_repeat, clamp };
 
 struct Texture {
@@ -81,8 +88,10 @@ struct SurfaceMesh {
   int primitive = -1;
   int material =
       -1;  // index into Scene::materials; every mesh has one (the default one if need be)
-  std::vector<Vec3> positions;  // normalised space
-  std::vector<Vec3> normals;    // unit, one a position; from the file or the mean geometric normal
+  // Normalised space, in the file's order and number, also where no triangle uses them. One that
+  // was dropped (not finite, oversize) stands at the origin.
+  std::vector<Vec3> positions;
+  std::vector<Vec3> normals;  // unit, one a position; from the file or the mean geometric normal
   bool normals_from_file = false;
   std::vector<Vec2> texcoords[2];            // empty or one a position
   std::vector<std::array<float, 4>> colors;  // COLOR_0, linear RGBA, empty or one a position
@@ -123,7 +132,7 @@ struct SceneReport {
 
 struct Scene {
   Normalisation normalisation;
-  Bounds bounds;  // of the normalised positions; empty() for an empty scene
+  Bounds bounds;  // of the normalised positions that triangles use; empty() without triangles
   std::vector<SurfaceMesh> meshes;
   std::vector<Material> materials;
   std::vector<Texture> textures;
