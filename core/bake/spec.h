@@ -111,8 +111,10 @@ uint64_t max_samples(const Spec& spec);
 // A fault of a spec at a JSON pointer relative to the spec's root.
 struct SpecFault {
   std::string pointer;
-  std::string code;     // missing | unknown | type | range | conflict
-  std::string message;  // one sentence: what is wrong and what is allowed
+  std::string code;             // missing | unknown | type | range | conflict | duplicate | syntax
+  std::string message;          // one sentence: what is wrong and what is allowed
+  std::string allowed = {};     // the values or the range that would do; "" = not said
+  std::string suggestion = {};  // the nearest known name; "" = none is near
 };
 
 // Every fault that can be told without opening a file; empty when the spec can be ordered.
