@@ -26,7 +26,7 @@
 
 namespace lightkiln {
 
-// The bytes behind a spec's digests.
+// The bytes behind a spec's digests. They outlive the Bake that they are handed to.
 struct Inputs {
   std::map<std::string, std::span<const std::byte>> blobs;  // by digest "sha256:..."
 };

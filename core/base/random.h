@@ -30,6 +30,12 @@ struct Point4 {
 // element, replicate, set), where sets are constants per effect. Sample counts are powers of two.
 Point4 sobol4(uint64_t key, uint32_t index);
 
+// The same point before its rounding to float: four times 32 bits.
+struct SobolBits4 {
+  uint32_t x = 0, y = 0, z = 0, w = 0;
+};
+SobolBits4 sobol4_bits(uint64_t key, uint32_t index);
+
 // The same sequence's first two dimensions, at half the cost.
 struct Point2 {
   float x = 0, y = 0;

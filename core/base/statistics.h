@@ -27,11 +27,31 @@ double student_t(double confidence, int degrees_of_freedom);
 // 95 % confidence half-width of the mean of `replicate_means`: t_{R-1} * s / sqrt(R).
 double replicate_half_width(std::span<const double> replicate_means, double confidence = 0.95);
 
-// The same for a quantity in [0, 1] seen `total_samples` times: never trusts zero variance. The
-// variance is floored by that of a binomial with two successes and two failures added (Agresti and
-// Coull 1998), scaled by the quasi-Monte Carlo gain that all-equal replicates cannot show.
+// The standard error of a mean in [0, 1] from R replicate means of `total_samples` samples in all:
+// the replicates' own, floored by what they cannot show. Never zero.
+double bounded_standard_error(std::span<const double> replicate_means, uint64_t total_samples);
+
+// t_{R-1} times bounded_standard_error: never trusts zero variance.
 double bounded_half_width(std::span<const double> replicate_means, uint64_t total_samples,
                           double confidence = 0.95);
+
+// Tells when a mean of non-negative values hangs on few of them, so that its variance estimate
+// cannot be trusted: one value holds more than a tenth of the sum, or the kurtosis exceeds 100.
+// Judges from 64 values on.
+struct TailGuard {
+  uint64_t count = 0;
+  double sum = 0, sum2 = 0, sum3 = 0, sum4 = 0;
+  double largest = 0;
+
+  void add(double value);
+  void merge(const TailGuard& other);
+  bool suspicious() const;
+};
+
+// A sum in double over a fixed tree (halves, down to blocks of 1024): the same bits whoever
+// computes it, error growing with the logarithm of the length.
+double tree_sum(std::span<const double> values);
+double tree_sum(std::span<const float> values);
 
 // Level to spend at the k-th look (k = 1, 2, ...) so that all looks together spend alpha:
 // alpha / (k (k + 1)).

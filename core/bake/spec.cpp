@@ -1,0 +1,210 @@
+#include "core/bake/spec.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <string_view>
+
+namespace lightkiln {
+
+const char* kind_name(Kind kind) {
+  switch (kind) {
+    case Kind::ambient_occlusion:
+      return "ambient_occlusion";
+    case Kind::environment_maps:
+      return "environment_maps";
+    case Kind::probes:
+      return "probes";
+  }
+  return "";
+}
+
+double default_target_error(Kind kind) {
+  switch (kind) {
+    case Kind::ambient_occlusion:
+      return 0.02;
+    case Kind::environment_maps:
+      return 0.001;
+    case Kind::probes:
+      return 0.05;
+  }
+  return 0.02;
+}
+
+double target_error(const Spec& spec) {
+  return spec.accuracy.target_error.value_or(default_target_error(spec.kind()));
+}
+
+uint64_t max_samples(const Spec& spec) {
+  return std::bit_ceil(spec.accuracy.max_samples.value_or(65536));
+}
+
+namespace {
+
+// Collects faults; each check reads as one sentence of the contract.
+class Checker {
+ public:
+  void fault(std::string pointer, std::string code, std::string message) {
+    faults_.push_back({std::move(pointer), std::move(code), std::move(message)});
+  }
+  void positive(const std::optional<double>& value, const std::string& pointer,
+                const std::string& name) {
+    if (value && !(std::isfinite(*value) && *value > 0))
+      fault(pointer, "range", name + " must be a finite number above 0.");
+  }
+  template <typename T>
+  void between(T value, T low, T high, const std::string& pointer, const std::string& name) {
+    if (value < low || value > high)
+      fault(pointer, "range",
+            name + " is " + std::to_string(value) + "; allowed are " + std::to_string(low) +
+                " to " + std::to_string(high) + ".");
+  }
+  std::vector<SpecFault> take() { return std::move(faults_); }
+
+ private:
+  std::vector<SpecFault> faults_;
+};
+
+bool is_blob_digest(const std::string& text) {
+  constexpr std::string_view kPrefix = "sha256:";
+  if (text.size() != kPrefix.size() + 64 || !text.starts_with(kPrefix)) return false;
+  return text.find_first_not_of("0123456789abcdef", kPrefix.size()) == std::string::npos;
+}
+
+// Relative, and never upwards: the URI is a key, not a path, but it may become a name elsewhere.
+bool is_plain_uri(const std::string& uri) {
+  if (uri.empty() || uri.front() == '/' || uri.find('\\') != std::string::npos ||
+      uri.find(':') != std::string::npos)
+    return false;
+  for (size_t begin = 0; begin <= uri.size();) {
+    const size_t end = std::min(uri.find('/', begin), uri.size());
+    if (uri.substr(begin, end - begin) == "..") return false;
+    begin = end + 1;
+  }
+  return true;
+}
+
+void check_input(const InputRef& input, const std::string& pointer, Checker& checker) {
+  if (!is_blob_digest(input.blob))
+    checker.fault(pointer, "type",
+                  "An input is a digest \"sha256:\" followed by 64 lower-case hexadecimal digits.");
+  for (const auto& [uri, digest] : input.resources) {
+    if (!is_plain_uri(uri))
+      checker.fault(pointer + "/resources", "range",
+                    "The resource URI \"" + uri + "\" must be relative and free of \"..\".");
+    if (!is_blob_digest(digest))
+      checker.fault(pointer + "/resources", "type",
+                    "The resource \"" + uri +
+                        "\" needs a digest \"sha256:\" followed by 64 "
+                        "lower-case hexadecimal digits.");
+  }
+}
+
+void require_input(const std::optional<InputRef>& input, const std::string& name, Kind kind,
+                   Checker& checker) {
+  if (!input)
+    checker.fault("/inputs/" + name, "missing",
+                  std::string(kind_name(kind)) + " needs the input \"" + name + "\".");
+}
+
+void refuse_input(const std::optional<InputRef>& input, const std::string& name, Kind kind,
+                  Checker& checker) {
+  if (input)
+    checker.fault("/inputs/" + name, "conflict",
+                  std::string(kind_name(kind)) + " does not use the input \"" + name + "\".");
+}
+
+void check_ambient_occlusion(const AmbientOcclusionParameters& p, Checker& checker) {
+  checker.positive(p.max_distance, "/parameters/max_distance", "max_distance");
+  checker.positive(p.falloff_distance, "/parameters/falloff_distance", "falloff_distance");
+  const bool scaled = p.falloff == Falloff::linear || p.falloff == Falloff::quadratic ||
+                      p.falloff == Falloff::smooth;
+  if (scaled && !p.max_distance)
+    checker.fault("/parameters/max_distance", "missing",
+                  "The falloffs linear, quadratic and smooth need a max_distance.");
+  if (p.falloff == Falloff::exponential && !p.falloff_distance)
+    checker.fault("/parameters/falloff_distance", "missing",
+                  "The falloff exponential needs a falloff_distance.");
+  if (p.falloff != Falloff::exponential && p.falloff_distance)
+    checker.fault("/parameters/falloff_distance", "conflict",
+                  "falloff_distance belongs to the falloff exponential only.");
+}
+
+void check_environment_maps(const EnvironmentMapsParameters& p, Checker& checker) {
+  if (!p.sh && !p.irradiance && !p.prefilter && !p.dfg)
+    checker.fault("/parameters", "missing",
+                  "Order at least one of sh, irradiance, prefilter and dfg.");
+  if (p.sh) checker.between(p.sh->bands, 1, 33, "/parameters/sh/bands", "bands");
+  if (p.irradiance)
+    checker.between(p.irradiance->size, 1, 1024, "/parameters/irradiance/size", "size");
+  if (p.dfg) checker.between(p.dfg->size, 8, 1024, "/parameters/dfg/size", "size");
+  if (!p.prefilter) return;
+  const auto [size, levels] = *p.prefilter;
+  if (size < 8 || size > 2048 || !std::has_single_bit(static_cast<unsigned int>(size)))
+    checker.fault(
+        "/parameters/prefilter/size", "range",
+        "size is " + std::to_string(size) + "; allowed are the powers of two from 8 to 2048.");
+  checker.between(levels, 2, 12, "/parameters/prefilter/levels", "levels");
+  if (levels >= 2 && levels <= 12 && size >= 8 && (size >> (levels - 1)) < 1)
+    checker.fault("/parameters/prefilter/levels", "conflict",
+                  "A size of " + std::to_string(size) + " has no " + std::to_string(levels) +
+                      " levels: each is half the one before and the last is at least 1.");
+}
+
+void check_probes(const ProbesParameters& p, Checker& checker) {
+  constexpr size_t kMostPositions = 10000;
+  if (p.positions.empty() || p.positions.size() > kMostPositions)
+    checker.fault(
+        "/parameters/positions", p.positions.empty() ? "missing" : "range",
+        "There are " + std::to_string(p.positions.size()) + " positions; allowed are 1 to 10000.");
+  for (size_t i = 0; i < p.positions.size(); ++i) {
+    const Vec3d& position = p.positions[i];
+    const double largest =
+        std::max({std::fabs(position.x), std::fabs(position.y), std::fabs(position.z)});
+    if (!is_finite(position) || largest > 1e18)
+      checker.fault("/parameters/positions/" + std::to_string(i), "range",
+                    "A position is three finite numbers of at most 1e18.");
+  }
+  checker.between(p.cubemap.size, 1, 512, "/parameters/cubemap/size", "size");
+  checker.between(p.sh.bands, 1, 33, "/parameters/sh/bands", "bands");
+  if (p.max_bounces)
+    checker.between(*p.max_bounces, 0, 64, "/parameters/max_bounces", "max_bounces");
+}
+
+void check_accuracy(const Accuracy& accuracy, Checker& checker) {
+  if (accuracy.target_error && !(*accuracy.target_error > 0 && *accuracy.target_error <= 1))
+    checker.fault("/accuracy/target_error", "range", "target_error must be above 0 and at most 1.");
+  if (accuracy.max_samples)
+    checker.between<uint64_t>(*accuracy.max_samples, 64, 1048576, "/accuracy/max_samples",
+                              "max_samples");
+  checker.positive(accuracy.max_seconds, "/accuracy/max_seconds", "max_seconds");
+}
+
+}  // namespace
+
+std::vector<SpecFault> validate(const Spec& spec) {
+  Checker checker;
+  const Kind kind = spec.kind();
+  switch (kind) {
+    case Kind::ambient_occlusion:
+      require_input(spec.scene, "scene", kind, checker);
+      refuse_input(spec.environment, "environment", kind, checker);
+      check_ambient_occlusion(std::get<AmbientOcclusionParameters>(spec.parameters), checker);
+      break;
+    case Kind::environment_maps:
+      refuse_input(spec.scene, "scene", kind, checker);
+      require_input(spec.environment, "environment", kind, checker);
+      check_environment_maps(std::get<EnvironmentMapsParameters>(spec.parameters), checker);
+      break;
+    case Kind::probes:
+      require_input(spec.scene, "scene", kind, checker);
+      check_probes(std::get<ProbesParameters>(spec.parameters), checker);
+      break;
+  }
+  if (spec.scene) check_input(*spec.scene, "/inputs/scene", checker);
+  if (spec.environment) check_input(*spec.environment, "/inputs/environment", checker);
+  check_accuracy(spec.accuracy, checker);
+  return checker.take();
+}
+
+}  // namespace lightkiln
