@@ -32,7 +32,7 @@ export async function startDaemon() {
     await new Promise((resolve) => (child.exitCode !== null ? resolve() : child.once("exit", resolve)));
     rmSync(folder, { recursive: true, force: true });
   };
-  return { url, stop };
+  return { url, stop, pid: child.pid };
 }
 
 export async function upload(url, path) {
