@@ -112,6 +112,9 @@ struct Claim {
 struct ChunkCommit {
   std::vector<std::byte> bytes;
   std::string report_json;  // ChunkReport
+  // The report's last round, from which the job's current_error is summed.
+  uint64_t elements = 0;
+  double error_sum_sq = 0;
 };
 
 struct StoredChunk {
@@ -165,6 +168,7 @@ class Store {
   // --- jobs, for clients -------------------------------------------------------------------------
   virtual SubmitResult submit(const Submission& submission) = 0;
   virtual std::optional<JobRecord> find_job(const std::string& id) = 0;
+  // Without plan_json and accuracy_json, which can be large.
   virtual std::vector<JobRecord> list_jobs(const JobFilter& filter) = 0;
   virtual uint64_t
   list_version() = 0;  // rises with every visible change of any job: the list's ETag

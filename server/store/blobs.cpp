@@ -1,0 +1,238 @@
+#include "server/store/blobs.h"
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <vector>
+
+#include <fcntl.h>
+#include <openssl/evp.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "core/base/error.h"
+#include "server/store/process_identity.h"
+#include "server/store/storage_failure.h"
+
+namespace lightkiln {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::string_view kPrefix = "sha256:";
+constexpr size_t kPiece = 1u << 20;
+
+std::string_view hex_of(std::string_view digest) {
+  const bool good =
+      digest.size() == kPrefix.size() + 64 && digest.substr(0, kPrefix.size()) == kPrefix &&
+      digest.find_first_not_of("0123456789abcdef", kPrefix.size()) == std::string_view::npos;
+  if (!good)
+    throw Error(ErrorCode::invalid_input,
+                "A digest must read 'sha256:' and 64 lower-case hexadecimal digits.");
+  return digest.substr(kPrefix.size());
+}
+
+void fsync_folder(const std::string& path) {
+  const int fd = open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) stop_for_storage_failure("opening the folder " + path);
+  fsync_or_stop(fd, path);
+  close(fd);
+}
+
+// Temporary names begin with their maker's identity, slashes replaced.
+std::string identity_prefix() {
+  std::string identity = own_process_identity();
+  for (char& c : identity)
+    if (c == '/') c = '_';
+  return identity;
+}
+
+void sweep_drafts(const fs::path& folder) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    std::string name = entry.path().filename().string();
+    name.resize(name.rfind('+') == std::string::npos ? 0 : name.rfind('+'));
+    for (char& c : name)
+      if (c == '_') c = '/';
+    std::error_code gone_already;
+    if (is_provably_dead(name)) fs::remove(entry.path(), gone_already);
+  }
+}
+
+}  // namespace
+
+struct Sha256::Context {
+  EVP_MD_CTX* evp = EVP_MD_CTX_new();
+  ~Context() { EVP_MD_CTX_free(evp); }
+};
+
+Sha256::Sha256() : context_(std::make_unique<Context>()) {
+  if (!context_->evp || EVP_DigestInit_ex(context_->evp, EVP_sha256(), nullptr) != 1)
+    throw Error(ErrorCode::internal, "SHA-256 is not available.");
+}
+Sha256::~Sha256() = default;
+
+void Sha256::update(const void* data, size_t size) {
+  EVP_DigestUpdate(context_->evp, data, size);
+}
+
+std::string Sha256::digest() {
+  unsigned char bytes[32];
+  unsigned int size = 0;
+  EVP_DigestFinal_ex(context_->evp, bytes, &size);
+  std::string text(kPrefix);
+  for (const unsigned char byte : bytes) {
+    text += "0123456789abcdef"[byte >> 4];
+    text += "0123456789abcdef"[byte & 15];
+  }
+  return text;
+}
+
+Blobs::Blobs(const std::string& root) : root_(root) {
+  fs::create_directories(root_ + "/incoming");
+  fs::create_directories(root_ + "/quarantine");
+  for (int shard = 0; shard < 256; ++shard) {
+    const char name[] = {'/', "0123456789abcdef"[shard >> 4], "0123456789abcdef"[shard & 15], 0};
+    fs::create_directory(root_ + name);
+  }
+  fsync_folder(root_);
+  sweep_drafts(root_ + "/incoming");
+}
+
+Blobs::Draft::Draft(Blobs& blobs) : blobs_(blobs) {
+  {
+    const std::lock_guard lock(blobs_.mutex_);
+    static const std::string prefix = identity_prefix();
+    path_ = blobs_.root_ + "/incoming/" + prefix + "+" + std::to_string(++blobs_.drafts_) + "." +
+            std::to_string(reinterpret_cast<uintptr_t>(&blobs_));
+  }
+  fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+  if (fd_ < 0)
+    throw Error(ErrorCode::unavailable,
+                std::string("The store cannot make a file: ") + std::strerror(errno) + ".");
+}
+
+Blobs::Draft::~Draft() {
+  if (fd_ >= 0) close(fd_);
+  if (!path_.empty()) unlink(path_.c_str());
+}
+
+void Blobs::Draft::append(const void* data, size_t size) {
+  hash_.update(data, size);
+  const char* next = static_cast<const char*>(data);
+  while (size > 0) {
+    const ssize_t written = write(fd_, next, size);
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0)
+      throw Error(ErrorCode::unavailable,
+                  std::string("The store cannot write: ") + std::strerror(errno) + ".");
+    next += written;
+    size -= static_cast<size_t>(written);
+  }
+}
+
+std::string Blobs::Draft::finish() {
+  if (digest_.empty()) digest_ = hash_.digest();
+  return digest_;
+}
+
+bool Blobs::Draft::keep() {
+  finish();
+  if (blobs_.has(digest_)) return false;
+  fsync_or_stop(fd_, path_);
+  const std::string final_path = blobs_.path_of(digest_);
+  if (rename(path_.c_str(), final_path.c_str()) != 0)
+    stop_for_storage_failure("renaming to " + final_path);
+  path_.clear();
+  fsync_folder(fs::path(final_path).parent_path().string());
+  const std::lock_guard lock(blobs_.mutex_);
+  blobs_.verified_.insert(digest_);
+  return true;
+}
+
+std::string Blobs::put(std::span<const std::byte> bytes) {
+  Sha256 hash;
+  hash.update(bytes.data(), bytes.size());
+  std::string digest = hash.digest();
+  if (has(digest)) return digest;
+  Draft draft(*this);
+  draft.append(bytes.data(), bytes.size());
+  draft.keep();
+  return digest;
+}
+
+std::string Blobs::path_of(const std::string& digest) const {
+  const std::string hex(hex_of(digest));
+  return root_ + "/" + hex.substr(0, 2) + "/" + hex;
+}
+
+bool Blobs::has(const std::string& digest) const {
+  return access(path_of(digest).c_str(), F_OK) == 0;
+}
+
+int Blobs::open(const std::string& digest, uint64_t* size) {
+  const int fd = ::open(path_of(digest).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+  struct stat info {};
+  if (fd < 0 || fstat(fd, &info) != 0) {
+    if (fd >= 0) close(fd);
+    throw Error(ErrorCode::not_found, "There is no blob " + digest + ".");
+  }
+  if (size) *size = static_cast<uint64_t>(info.st_size);
+  {
+    const std::lock_guard lock(mutex_);
+    if (verified_.contains(digest)) return fd;
+  }
+  Sha256 hash;
+  std::vector<char> piece(kPiece);
+  off_t offset = 0;
+  ssize_t got = 0;
+  while ((got = pread(fd, piece.data(), piece.size(), offset)) > 0) {
+    hash.update(piece.data(), static_cast<size_t>(got));
+    offset += got;
+  }
+  if (got < 0 || hash.digest() != digest) {
+    close(fd);
+    quarantine(digest);
+    throw Error(ErrorCode::internal,
+                "The stored blob " + digest + " no longer matches its digest; it was set aside.");
+  }
+  const std::lock_guard lock(mutex_);
+  verified_.insert(digest);
+  return fd;
+}
+
+std::string Blobs::read(const std::string& digest) {
+  uint64_t size = 0;
+  const int fd = open(digest, &size);
+  std::string bytes(size, '\0');
+  size_t done = 0;
+  while (done < size) {
+    const ssize_t got = pread(fd, bytes.data() + done, size - done, static_cast<off_t>(done));
+    if (got <= 0) break;
+    done += static_cast<size_t>(got);
+  }
+  close(fd);
+  Sha256 hash;
+  hash.update(bytes.data(), done);
+  if (done != size || hash.digest() != digest) {
+    quarantine(digest);
+    throw Error(ErrorCode::internal,
+                "The stored blob " + digest + " no longer matches its digest; it was set aside.");
+  }
+  return bytes;
+}
+
+void Blobs::remove(const std::string& digest) {
+  unlink(path_of(digest).c_str());
+  const std::lock_guard lock(mutex_);
+  verified_.erase(digest);
+}
+
+void Blobs::quarantine(const std::string& digest) {
+  const std::string aside = root_ + "/quarantine/" + std::string(hex_of(digest));
+  rename(path_of(digest).c_str(), aside.c_str());
+  const std::lock_guard lock(mutex_);
+  verified_.erase(digest);
+}
+
+}  // namespace lightkiln

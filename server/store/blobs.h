@@ -1,0 +1,77 @@
+#pragma once
+
+// The content-addressed directory: <root>/<first two digits>/<64 digits>. A file appears under its
+// name only complete and durable: temporary file, write, fsync, rename, fsync of the folder.
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <string_view>
+#include <unordered_set>
+
+namespace lightkiln {
+
+// SHA-256 over bytes that arrive piece by piece.
+class Sha256 {
+ public:
+  Sha256();
+  ~Sha256();
+  Sha256(const Sha256&) = delete;
+  Sha256& operator=(const Sha256&) = delete;
+  void update(const void* data, size_t size);
+  std::string digest();  // "sha256:<64 lower-case hex>"; call once
+
+ private:
+  struct Context;
+  std::unique_ptr<Context> context_;
+};
+
+class Blobs {
+ public:
+  // Makes the folders and sweeps temporary files that dead processes left.
+  explicit Blobs(const std::string& root);
+
+  // A temporary file that is hashed while it is written; removed unless it was kept.
+  class Draft {
+   public:
+    explicit Draft(Blobs& blobs);
+    ~Draft();
+    Draft(const Draft&) = delete;
+    Draft& operator=(const Draft&) = delete;
+    // Throws Error{unavailable} when the disk is full.
+    void append(const void* data, size_t size);
+    // Ends the writing and returns the digest.
+    std::string finish();
+    // Makes the bytes durable under their digest; false when they were there already.
+    bool keep();
+
+   private:
+    Blobs& blobs_;
+    std::string path_, digest_;
+    int fd_ = -1;
+    Sha256 hash_;
+  };
+
+  std::string put(std::span<const std::byte> bytes);
+  // Throws Error{invalid_input} unless `digest` reads "sha256:<64 lower-case hex>".
+  bool has(const std::string& digest) const;
+  // As Store::open_blob.
+  int open(const std::string& digest, uint64_t* size);
+  // Whole contents, verified on every read.
+  std::string read(const std::string& digest);
+  void remove(const std::string& digest);
+
+ private:
+  std::string path_of(const std::string& digest) const;
+  void quarantine(const std::string& digest);
+
+  std::string root_;
+  std::mutex mutex_;
+  std::unordered_set<std::string> verified_;
+  uint64_t drafts_ = 0;
+};
+
+}  // namespace lightkiln
