@@ -17,9 +17,11 @@ PixelRepairs sanitise(Image& image);
 
 // An exposure in stops, then the Khronos PBR neutral tone curve (Khronos Group 2024), then sRGB.
 struct TonemapOptions {
-  double exposure_stops = 0.0;
+  double exposure_stops = 0.0;  // each stop doubles; 0 leaves values as they are
 };
 struct Image8;
+// For looking at, not for measuring: NaN and negative values show as 0. Three channels; four when
+// the image has alpha, which is kept linear.
 Image8 tonemap(const Image& image, const TonemapOptions& options);
 
 }  // namespace lightkiln

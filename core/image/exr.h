@@ -28,9 +28,12 @@ struct ExrWriteOptions {
   std::map<std::string, std::string> attributes;
 };
 
-// Reads scan-line or tiled files of any compression; of a multi-part file the first part with R, G,
-// B or Y. Throws Error: invalid_input when malformed, unsupported when deep, too_large above 16384
-// pixels a side or 67,108,864 pixels. NaN, infinite and negative values are returned as stored.
+// Reads scan-line or tiled files (level 0) of any compression; of a multi-part file the first part
+// with R, G and B, or Y, or Y, RY and BY. Other channels, alpha among them, are dropped; stated
+// chromaticities are converted to Rec. 709 with white kept white. Throws Error: invalid_input when
+// malformed, cut short or incomplete; unsupported when deep, without such channels or subsampled
+// otherwise; too_large above the limits of image.h. NaN, infinite and negative values are returned
+// as stored (the conversion of a pixel that holds one spreads it to all three channels).
 DecodedImage read_exr(std::span<const std::byte> bytes);
 
 // Writes a single-part scan-line ZIP file with channels R, G, B (A) or Y, chromaticities of Rec.

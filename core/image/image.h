@@ -39,6 +39,18 @@ struct Image {
   }
 };
 
+// What any reader or writer accepts.
+inline constexpr int kMaxImageSide = 16384;
+inline constexpr int64_t kMaxImagePixels = 67'108'864;
+
+// Throws Error: too_large above the limits, invalid_input below 1 x 1. `what` begins the sentence,
+// e.g. "An OpenEXR image".
+void check_image_size(int64_t width, int64_t height, const std::string& what);
+
+// Text taken from a file, fit for a message: bytes other than printable ASCII become '?', and what
+// is longer than 200 characters is cut.
+std::string printable(std::string text);
+
 // What was repaired while reading, counted by kind. Nothing is repaired silently.
 struct PixelRepairs {
   uint64_t nan = 0;       // set to 0

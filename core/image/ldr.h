@@ -15,17 +15,19 @@ namespace lightkiln {
 struct Image8 {
   int width = 0;
   int height = 0;
-  int channels = 0;             // always 4 after reading
+  int channels = 0;             // 1 to 4; always 4 after reading
   std::vector<uint8_t> pixels;  // as stored (sRGB for colour), [(y * width + x) * channels + c]
 };
 
-// Decodes PNG or JPEG to RGBA. Throws Error: invalid_input when malformed, too_large above
-// 16384 a side or 67,108,864 pixels.
+// Decodes PNG or JPEG to RGBA; of 16-bit PNG the upper 8 bits. Throws Error: invalid_input when
+// malformed, cut short or (PNG) with a wrong checksum, too_large above the limits of image.h.
 Image8 read_ldr(std::span<const std::byte> bytes);
 
+// Grey, grey and alpha, RGB or RGBA by the number of channels. Equal pixels give equal bytes.
 std::vector<std::byte> write_png(const Image8& image);
 
-// IEC 61966-2-1.
+// IEC 61966-2-1. The inverse rounds to nearest; values outside [0, 1] go to the nearer end, NaN to
+// 0.
 float srgb_to_linear(uint8_t encoded);
 uint8_t linear_to_srgb(float linear);
 
