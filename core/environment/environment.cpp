@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 
+#include "core/base/error.h"
 #include "core/image/decode.h"
 #include "core/sphere/direction_map.h"
 #include "core/sphere/solid_angle.h"

@@ -104,7 +104,7 @@ void Fourier::forward(Complex4* data, std::vector<Complex4>& work) const {
   if (work.size() < 2 * padded) work.resize(2 * padded);
   Complex4* signal = work.data();
   for (size_t j = 0; j < length; ++j) signal[j] = times(data[j], chirp_re_[j], chirp_im_[j]);
-  for (size_t j = length; j < padded; ++j) signal[j] = {};
+  for (size_t j = length; j < padded; ++j) signal[j] = Complex4{Lanes{}, Lanes{}};
   power_of_two(signal, signal + padded);
   for (size_t j = 0; j < padded; ++j) signal[j] = times(signal[j], filter_re_[j], filter_im_[j]);
   swap_parts(signal, padded_);
