@@ -1,0 +1,197 @@
+#include "proto/spec_table.h"
+
+namespace lightkiln {
+namespace {
+
+using Ao = AmbientOcclusionParameters;
+using Maps = EnvironmentMapsParameters;
+using Probes = ProbesParameters;
+
+template <typename T>
+T& parameters(Spec& spec) {
+  return std::get<T>(spec.parameters);
+}
+template <typename T>
+const T& parameters(const Spec& spec) {
+  return std::get<T>(spec.parameters);
+}
+
+constexpr double kWhole64 = 18446744073709551615.0;
+constexpr Range kPositive{0, 1e300, true};
+
+ParameterGroup accuracy_group() {
+  return {
+      "/accuracy",
+      {{"target_error",
+        +[](Spec& s) -> std::optional<double>& { return s.accuracy.target_error; },
+        {0, 1, true},
+        false,
+        "95 % confidence half-width per element: absolute for ambient occlusion, relative to "
+        "the job's mean luminance for radiance. null = the kind's default. Halving it costs "
+        "2.6 to 4 times the time."},
+       {"max_samples",
+        +[](Spec& s) -> std::optional<uint64_t>& { return s.accuracy.max_samples; },
+        {64, 1048576},
+        false,
+        "Samples per element or texel at the most, rounded up to a power of two. null = "
+        "65536."},
+       {"max_seconds", +[](Spec& s) -> std::optional<double>& { return s.accuracy.max_seconds; },
+        kPositive, false,
+        "Seconds that baking may be predicted to take; it pins a sample count before baking "
+        "starts. null = no limit."}}};
+}
+
+ParameterGroup root_group() {
+  return {"",
+          {{"seed",
+            +[](Spec& s) -> uint64_t& { return s.seed; },
+            {0, kWhole64},
+            false,
+            "Random streams are a pure function of it: equal specs give equal bytes."}}};
+}
+
+constexpr Range kBands{1, 33};
+constexpr std::string_view kBandsMeaning =
+    "Bands of spherical harmonics; bands squared coefficients. Cost grows with their number.";
+
+KindTable ambient_occlusion_table() {
+  ParameterGroup own = {
+      "/parameters",
+      {{"target",
+        NameMember{{"vertices"},
+                   [](const Spec& s) { return static_cast<size_t>(parameters<Ao>(s).target); },
+                   [](Spec& s, size_t i) { parameters<Ao>(s).target = AoTarget(i); }},
+        {},
+        false,
+        "Where openness is wanted."},
+       {"max_distance",
+        +[](Spec& s) -> std::optional<double>& { return parameters<Ao>(s).max_distance; },
+        kPositive, false,
+        "World units. null = infinite. Shorter is cheaper. The falloffs linear, quadratic and "
+        "smooth need one."},
+       {"falloff",
+        NameMember{{"none", "linear", "quadratic", "smooth", "exponential"},
+                   [](const Spec& s) { return static_cast<size_t>(parameters<Ao>(s).falloff); },
+                   [](Spec& s, size_t i) { parameters<Ao>(s).falloff = Falloff(i); }},
+        {},
+        false,
+        "mu of a hit at distance d, with t = d / max_distance: none 0, linear t, quadratic t^2, "
+        "smooth 3t^2 - 2t^3, exponential 1 - exp(-d / falloff_distance)."},
+       {"falloff_distance",
+        +[](Spec& s) -> std::optional<double>& { return parameters<Ao>(s).falloff_distance; },
+        kPositive, false, "World units. Required by the falloff exponential, refused otherwise."},
+       {"distribution",
+        NameMember{
+            {"cosine", "uniform"},
+            [](const Spec& s) { return static_cast<size_t>(parameters<Ao>(s).distribution); },
+            [](Spec& s, size_t i) { parameters<Ao>(s).distribution = Distribution(i); }},
+        {},
+        false,
+        "How directions of the hemisphere are weighted."}}};
+  return {Kind::ambient_occlusion,
+          "Openness at every vertex of a scene: 1 = open sky.",
+          {{"scene", &Spec::scene, true}},
+          {root_group(), accuracy_group(), own}};
+}
+
+KindTable environment_maps_table() {
+  std::vector<ParameterGroup> groups = {root_group(), accuracy_group(), {"/parameters", {}}};
+  groups.push_back({"/parameters/sh",
+                    {{"bands", +[](Spec& s) -> int& { return parameters<Maps>(s).sh->bands; },
+                      kBands, false, kBandsMeaning}},
+                    [](const Spec& s) { return parameters<Maps>(s).sh.has_value(); },
+                    [](Spec& s) { parameters<Maps>(s).sh.emplace(); }});
+  groups.push_back({"/parameters/irradiance",
+                    {{"size",
+                      +[](Spec& s) -> int& { return parameters<Maps>(s).irradiance->size; },
+                      {1, 1024},
+                      false,
+                      "Texels along a face's side. Cost grows with its square."}},
+                    [](const Spec& s) { return parameters<Maps>(s).irradiance.has_value(); },
+                    [](Spec& s) { parameters<Maps>(s).irradiance.emplace(); }});
+  groups.push_back(
+      {"/parameters/prefilter",
+       {{"size",
+         +[](Spec& s) -> int& { return parameters<Maps>(s).prefilter->size; },
+         {8, 2048},
+         false,
+         "Texels along a face's side of level 0, a power of two."},
+        {"levels",
+         +[](Spec& s) -> int& { return parameters<Maps>(s).prefilter->levels; },
+         {2, 12},
+         false,
+         "Levels; each halves the size, and roughness runs linearly from 0 to 1. The last level "
+         "has at least one texel."}},
+       [](const Spec& s) { return parameters<Maps>(s).prefilter.has_value(); },
+       [](Spec& s) { parameters<Maps>(s).prefilter.emplace(); }});
+  groups.push_back({"/parameters/dfg",
+                    {{"size",
+                      +[](Spec& s) -> int& { return parameters<Maps>(s).dfg->size; },
+                      {8, 1024},
+                      false,
+                      "Texels a side of the split-sum table."}},
+                    [](const Spec& s) { return parameters<Maps>(s).dfg.has_value(); },
+                    [](Spec& s) { parameters<Maps>(s).dfg.emplace(); }});
+  return {
+      Kind::environment_maps,
+      "Coefficients, irradiance, a GGX-prefiltered chain and the DFG table of a lat-long image.",
+      {{"environment", &Spec::environment, true}},
+      groups};
+}
+
+KindTable probes_table() {
+  std::vector<ParameterGroup> groups = {root_group(), accuracy_group()};
+  groups.push_back(
+      {"/parameters",
+       {{"positions",
+         +[](Spec& s) -> std::vector<Vec3d>& { return parameters<Probes>(s).positions; },
+         {1, 10000},
+         true,
+         "Where the probes stand: [x, y, z] each, in world units."},
+        {"max_bounces",
+         +[](Spec& s) -> std::optional<int>& { return parameters<Probes>(s).max_bounces; },
+         {0, 64},
+         false,
+         "Diffuse bounces. 0 = only light that surfaces emit or the environment sends straight to "
+         "the probe. null = the fewest whose truncation bound stays under half the ordered "
+         "error."}}});
+  groups.push_back({"/parameters/cubemap",
+                    {{"size",
+                      +[](Spec& s) -> int& { return parameters<Probes>(s).cubemap.size; },
+                      {1, 512},
+                      false,
+                      "Texels along a face's side. Cost grows with its square."}}});
+  groups.push_back({"/parameters/sh",
+                    {{"bands", +[](Spec& s) -> int& { return parameters<Probes>(s).sh.bands; },
+                      kBands, false, kBandsMeaning}}});
+  return {Kind::probes,
+          "A radiance cubemap, coefficients, a distance cube and validity at each listed position.",
+          {{"scene", &Spec::scene, true}, {"environment", &Spec::environment, false}},
+          groups};
+}
+
+}  // namespace
+
+const KindTable& kind_table(Kind kind) {
+  static const KindTable tables[] = {ambient_occlusion_table(), environment_maps_table(),
+                                     probes_table()};
+  return tables[static_cast<size_t>(kind)];
+}
+
+Spec empty_spec(Kind kind) {
+  Spec spec;
+  switch (kind) {
+    case Kind::ambient_occlusion:
+      spec.parameters = AmbientOcclusionParameters{};
+      break;
+    case Kind::environment_maps:
+      spec.parameters = EnvironmentMapsParameters{};
+      break;
+    case Kind::probes:
+      spec.parameters = ProbesParameters{};
+      break;
+  }
+  return spec;
+}
+
+}  // namespace lightkiln
