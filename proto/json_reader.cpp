@@ -103,7 +103,8 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
     std::string path;
     for (const Level& level : open_) {
       const JsonValue::Array* items = level.value.array();
-      path += "/" + (items ? std::to_string(items->size()) : json_pointer_token(level.key));
+      path += '/';
+      path += items ? std::to_string(items->size()) : json_pointer_token(level.key);
     }
     return path;
   }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/bake/spec.h"
+#include "core/base/error.h"
 
 namespace lightkiln {
 

@@ -95,7 +95,7 @@ void read_position(const JsonPlace& place, std::vector<Vec3d>* out) {
   bool good = true;
   for (int axis = 0; axis < 3; ++axis)
     good &= read_value(place.child(std::to_string(axis), (*numbers)[static_cast<size_t>(axis)]),
-                       Range{}, &position[axis]);
+                       Range{-1e18, 1e18}, &position[axis]);
   if (good) out->push_back(position);
 }
 
@@ -318,7 +318,7 @@ std::string allowed_values(const ParameterRow& row) {
     }
     std::string operator()(std::vector<Vec3d>& (*)(Spec&)) const {
       return "a list of " + json_number(row.range.minimum) + " to " +
-             json_number(row.range.maximum) + " positions [x, y, z]";
+             json_number(row.range.maximum) + " positions [x, y, z], each from -1e18 to 1e18";
     }
     std::string operator()(const NameMember& member) const { return join_names(member.names); }
   };

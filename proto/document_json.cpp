@@ -1,0 +1,198 @@
+// The document of a result: what the images and tables beside it mean, in numbers and words that an
+// importer can check itself against.
+
+#include "proto/json.h"
+#include "proto/json_writer.h"
+
+namespace lightkiln {
+namespace {
+
+void write_frame(JsonWriter& writer, const Spec& spec, const Plan& plan) {
+  writer.member("kind", kind_name(plan.kind))
+      .member("engine_version", plan.engine_version)
+      .member("spec_digest", spec_digest(canonical_spec(spec)))
+      .key("spec")
+      .raw(canonical_spec(spec));
+}
+
+// World axes as glTF has them; every document says so.
+void write_axes(JsonWriter& writer) {
+  writer.member("handedness", "right")
+      .member("up", "+Y")
+      .member("forward", "+Z")
+      .member("length_unit", "world units of the scene");
+}
+
+void write_radiance_convention(JsonWriter& writer) {
+  writer.key("convention")
+      .begin_object()
+      .member("basis", "real spherical harmonics, orthonormal, polar axis +Z")
+      .member("condon_shortley", false)
+      .member("index", "l*l + l + m, m from -l to l")
+      .member("channel_order", "rgb")
+      .member("quantity", "radiance")
+      .member("units", "linear radiance as in the input; nothing is divided by pi")
+      .member("colour_space", "linear Rec. 709")
+      .member("latlong", "image centre +Z, +X left of it at longitude +pi/2, top row +Y")
+      .member("cube", "six faces stacked top to bottom: +X -X +Y -Y +Z -Z")
+      .member("texel_convention", "half_texel");
+  write_axes(writer);
+  writer.end_object();
+}
+
+void write_sh(JsonWriter& writer, const ShDocument& document) {
+  writer.begin_object().member("bands", document.sh.bands).key("coefficients").begin_array();
+  for (const Vec3d& coefficient : document.sh.coefficients) writer.value(coefficient);
+  writer.end_array().member("error", document.error).key("selftest").begin_array();
+  for (const ShSelftest& test : document.selftest)
+    writer.begin_object()
+        .member("direction", test.direction)
+        .member("radiance", test.radiance)
+        .member("irradiance", test.irradiance)
+        .end_object();
+  writer.end_array().end_object();
+}
+
+void write_ao(JsonWriter& writer, const AoDocument& document) {
+  writer.key("convention")
+      .begin_object()
+      .member("quantity", "openness: 1 = open sky, 0 = enclosed")
+      .member("index", "pixel i of the strip, row by row from the top left, is vertex i")
+      .member("units", "none")
+      .member("colour_space", "linear, one channel");
+  write_axes(writer);
+  writer.end_object();
+  writer.key("strip")
+      .begin_object()
+      .member("width", document.strip_width)
+      .member("height", document.strip_height)
+      .end_object();
+  writer.key("statistics")
+      .begin_object()
+      .member("vertices", document.vertices)
+      .member("mean", document.mean)
+      .member("min", document.min)
+      .member("max", document.max)
+      .member("error_rms", document.error_rms)
+      .member("error_max", document.error_max)
+      .end_object();
+  writer.key("meshes").begin_array();
+  for (const AoMeshIndex& mesh : document.meshes)
+    writer.begin_object()
+        .member("name", mesh.name)
+        .member("node", mesh.node)
+        .member("mesh", mesh.mesh)
+        .member("primitive", mesh.primitive)
+        .member("first", mesh.first)
+        .member("count", mesh.count)
+        .member("mean", mesh.mean)
+        .member("min", mesh.min)
+        .member("max", mesh.max)
+        .end_object();
+  writer.end_array();
+}
+
+void write_environment(JsonWriter& writer, const EnvironmentDocument& document) {
+  write_radiance_convention(writer);
+  writer.key("source")
+      .begin_object()
+      .member("width", document.source_width)
+      .member("height", document.source_height)
+      .member("format", document.source_format)
+      .member("mean", document.mean)
+      .member("max_luminance", document.max_luminance)
+      .key("repairs")
+      .begin_object()
+      .member("nan", document.repairs.nan)
+      .member("infinite", document.repairs.infinite)
+      .member("negative", document.repairs.negative)
+      .end_object()
+      .end_object();
+  writer.key("sh");
+  if (document.sh.empty())
+    writer.null();
+  else
+    write_sh(writer, document.sh.front());
+  writer.key("irradiance");
+  if (document.irradiance_artifact.empty())
+    writer.null();
+  else
+    writer.begin_object()
+        .member("artifact", document.irradiance_artifact)
+        .member("quantity", "irradiance")
+        .member("size", document.irradiance_size)
+        .member("error_bound", document.irradiance_error_bound)
+        .end_object();
+  writer.key("prefilter").begin_array();
+  for (const PrefilterLevel& level : document.prefilter)
+    writer.begin_object()
+        .member("artifact", level.artifact)
+        .member("size", level.size)
+        .member("roughness", level.roughness)
+        .member("alpha", level.roughness * level.roughness)
+        .member("error_bound", level.error_bound)
+        .end_object();
+  writer.end_array().key("dfg");
+  if (document.dfg_artifact.empty())
+    writer.null();
+  else
+    writer.begin_object()
+        .member("artifact", document.dfg_artifact)
+        .member("size", document.dfg_size)
+        .member("error_bound", document.dfg_error_bound)
+        .end_object();
+}
+
+void write_probes(JsonWriter& writer, const ProbesDocument& document) {
+  write_radiance_convention(writer);
+  writer.member("cubemap_size", document.cubemap_size).key("probes").begin_array();
+  for (const ProbeDocument& probe : document.probes) {
+    writer.begin_object()
+        .member("index", probe.index)
+        .member("position", probe.position)
+        .member("status", probe_status_name(probe.status))
+        .member("backface_share", probe.backface_share)
+        .member("hit_share", probe.hit_share)
+        .member("distance_mean", probe.distance_mean)
+        .member("distance_min", probe.distance_min)
+        .member("error", probe.error)
+        .member("accuracy", accuracy_status_name(probe.accuracy))
+        .member("radiance", probe.radiance_artifact)
+        .member("distance", probe.distance_artifact)
+        .key("sh");
+    write_sh(writer, probe.sh);
+    writer.end_object();
+  }
+  writer.end_array();
+}
+
+}  // namespace
+
+std::string write_document(const Assembly& assembly, const Spec& spec, const Plan& plan) {
+  JsonWriter writer;
+  writer.begin_object();
+  write_frame(writer, spec, plan);
+  if (const auto* ao = std::get_if<AoDocument>(&assembly.document))
+    write_ao(writer, *ao);
+  else if (const auto* environment = std::get_if<EnvironmentDocument>(&assembly.document))
+    write_environment(writer, *environment);
+  else
+    write_probes(writer, std::get<ProbesDocument>(assembly.document));
+  writer.key("artifacts").begin_array();
+  for (const Artifact& artifact : assembly.artifacts)
+    writer.begin_object()
+        .member("name", artifact.name)
+        .member("role", artifact.role)
+        .member("media_type", artifact.media_type)
+        .member("bytes", artifact.bytes.size())
+        .member("digest", sha256_digest(artifact.bytes.data(), artifact.bytes.size()))
+        .end_object();
+  writer.end_array().end_object();
+  return writer.take();
+}
+
+std::string document_name(Kind kind) {
+  return std::string(kind_name(kind)) + ".json";
+}
+
+}  // namespace lightkiln
