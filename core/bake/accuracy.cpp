@@ -61,15 +61,22 @@ double rms_error(const Round& round, uint64_t elements) {
 
 }  // namespace
 
+std::vector<Round> sum_rounds(const std::vector<ChunkReport>& reports) {
+  size_t count = 0;
+  for (const ChunkReport& report : reports) count = std::max(count, report.rounds.size());
+  std::vector<Round> rounds(count);
+  for (size_t i = 0; i < count; ++i)
+    for (const ChunkReport& report : reports) add_round(report, i, rounds[i]);
+  return rounds;
+}
+
 AccuracyRecord summarise_accuracy(const std::vector<ChunkReport>& reports, double target_error,
                                   double predicted_s, const std::string& error_unit) {
   AccuracyRecord record;
   record.target_error = target_error;
   record.error_unit = error_unit;
   record.predicted_s = predicted_s;
-  size_t rounds = 0;
   for (const ChunkReport& report : reports) {
-    rounds = std::max(rounds, report.rounds.size());
     record.elements += report.elements;
     record.suspicious += report.suspicious;
     record.budget_limited += report.budget_limited;
@@ -77,9 +84,7 @@ AccuracyRecord summarise_accuracy(const std::vector<ChunkReport>& reports, doubl
     record.cpu_s += report.cpu_s;
     record.actual_s += report.wall_s;
   }
-  record.rounds.resize(rounds);
-  for (size_t i = 0; i < rounds; ++i)
-    for (const ChunkReport& report : reports) add_round(report, i, record.rounds[i]);
+  record.rounds = sum_rounds(reports);
   if (!record.rounds.empty()) {
     const Round& last = record.rounds.back();
     record.error_rms = rms_error(last, record.elements);

@@ -68,13 +68,18 @@ struct AccuracyRecord {
   RayCounters counters;
 };
 
+// Rounds of parts baked side by side, summed by index in the order given; a part that stopped after
+// k rounds carries its last errors into later ones.
+std::vector<Round> sum_rounds(const std::vector<ChunkReport>& reports);
+
 // Sums reports in chunk order: rounds by index, a chunk that stopped after k rounds carries its
 // last errors into later ones.
 AccuracyRecord summarise_accuracy(const std::vector<ChunkReport>& reports, double target_error,
                                   double predicted_s, const std::string& error_unit);
 
 // Fits log(error) = a - beta log(samples) over the rounds and reads prices off it, with
-// time = t0 + b * samples; a round that reached the error is quoted as measured.
+// time = t0 + b * samples; a round that reached the error is quoted as measured. The error is the
+// rms of the elements' half-widths.
 std::vector<Price> price_errors(const std::vector<Round>& rounds, uint64_t elements);
 
 }  // namespace lightkiln

@@ -1,0 +1,235 @@
+// The plan of an ambient-occlusion job: which effects its rays need, and what each error costs.
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdio>
+#include <set>
+
+#include "core/bake/ao_state.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
+#include "core/base/statistics.h"
+#include "core/trace/texture.h"
+
+namespace lightkiln {
+
+namespace {
+
+constexpr uint64_t kFirstSamples = 256;  // 16 replicates of 16 points
+constexpr int kPilotRounds = 4;          // 256, 512, 1024 and 2048 samples
+constexpr uint64_t kPilotGroups = 64;
+constexpr uint64_t kPilotGroupSize = 8;
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
+
+// Runs of neighbouring vertices from all over the scene: a random sample of the work, read from
+// memory in the order in which the bake will read it. Ascending, without repeats.
+std::vector<uint64_t> pilot_vertices(uint64_t vertices, uint64_t seed) {
+  std::set<uint64_t> chosen;
+  if (vertices <= kPilotGroups * kPilotGroupSize) {
+    for (uint64_t v = 0; v < vertices; ++v) chosen.insert(v);
+  } else {
+    // One group in each of equal stretches, at a random place.
+    const uint64_t stretch = vertices / kPilotGroups;
+    for (uint64_t g = 0; g < kPilotGroups; ++g) {
+      const uint64_t first = g * stretch + hash_combine(seed, g) % (stretch - kPilotGroupSize + 1);
+      for (uint64_t i = 0; i < kPilotGroupSize; ++i) chosen.insert(first + i);
+    }
+  }
+  return {chosen.begin(), chosen.end()};
+}
+
+// What the pilot saw: each element's standard error after each round, how errors fall past the last
+// round, and what a ray takes.
+struct Pilot {
+  std::vector<std::vector<double>> errors;  // [round][element]
+  size_t elements = 0;
+  double beta = 0.75;
+  double seconds_per_ray = 0;
+  double seconds = 0;
+};
+
+// The slope of log(rms error) against log(samples) over the pilot's rounds.
+double fit_beta(const std::vector<std::vector<double>>& errors) {
+  if (errors.size() < 2) return 0.75;
+  std::vector<double> logs;
+  for (const auto& round : errors) {
+    double sum = 0;
+    for (const double error : round) sum += error * error;
+    if (sum <= 0) return 0.75;
+    logs.push_back(0.5 * std::log(sum));
+  }
+  const double fall = logs.front() - logs.back();
+  return std::clamp(fall / (static_cast<double>(logs.size() - 1) * std::log(2.0)), 0.5, 1.5);
+}
+
+Pilot run_pilot(const AoState& state, OpennessParameters parameters, Progress& progress) {
+  const double start_s = wall_seconds();
+  Pilot pilot;
+  const std::vector<uint64_t> ids = pilot_vertices(state.facets->vertices(), state.spec.seed);
+  pilot.elements = ids.size();
+  if (ids.empty()) return pilot;
+  parameters.target_error = 0;
+  parameters.min_samples = kFirstSamples;
+  parameters.max_samples = kFirstSamples << (kPilotRounds - 1);
+  const OpennessKernel kernel(*state.tracer, parameters);
+  const OpennessBatch batch = estimate_vertices(state, kernel, ids, true, progress);
+  pilot.errors = batch.history;
+  pilot.beta = fit_beta(batch.history);
+  uint64_t rays = 0;
+  for (const Round& round : batch.report.rounds) rays += round.rays;
+  pilot.seconds = wall_seconds() - start_s;
+  if (rays > 0) pilot.seconds_per_ray = batch.report.wall_s / static_cast<double>(rays);
+  return pilot;
+}
+
+// The mean number of samples that the stopping rule spends on an element for `target`, at most
+// `cap` each. Past the pilot's rounds an element's error falls by 2^-beta a doubling.
+double mean_samples(const Pilot& pilot, double target, uint64_t cap) {
+  double sum = 0;
+  for (size_t e = 0; e < pilot.elements; ++e) {
+    uint64_t samples = kFirstSamples;
+    double error = 0;
+    for (int look = 1;; ++look, samples *= 2) {
+      const auto round = static_cast<size_t>(look - 1);
+      error = round < pilot.errors.size() ? pilot.errors[round][e] : error * std::exp2(-pilot.beta);
+      if (samples >= cap || OpennessKernel::look_quantile(look) * error <= target) break;
+    }
+    sum += static_cast<double>(std::min(samples, cap));
+  }
+  return pilot.elements == 0 ? 0 : sum / static_cast<double>(pilot.elements);
+}
+
+double predict_seconds(const Pilot& pilot, uint64_t elements, double target, uint64_t cap) {
+  return mean_samples(pilot, target, cap) * static_cast<double>(elements) * pilot.seconds_per_ray;
+}
+
+// The largest sample count whose predicted time keeps the promise; never below 64.
+uint64_t samples_in_time(const Pilot& pilot, uint64_t elements, double target, uint64_t most,
+                         double max_seconds) {
+  uint64_t samples = most;
+  while (samples > 64 && predict_seconds(pilot, elements, target, samples) > max_seconds)
+    samples /= 2;
+  return samples;
+}
+
+Effect hit_distance_effect(const AoState& state) {
+  const bool active = state.parameters().falloff != Falloff::none;
+  return {"nearest_hit_distance", active,
+          active ? "The falloff weighs each hit by its distance, so rays look for the nearest hit."
+                 : "Without a falloff a hit counts fully at any distance: rays end at the first "
+                   "hit they find.",
+          active ? 1.0 : 0.0};
+}
+
+Effect max_distance_effect(const AoState& state) {
+  const AmbientOcclusionParameters& p = state.parameters();
+  const double world = length(state.scene.bounds.extent()) / state.scene.normalisation.scale();
+  if (!p.max_distance)
+    return {"max_distance", false,
+            "No max_distance is ordered: rays reach to the end of the scene.", 0};
+  const bool active = openness_parameters(state).max_distance != INFINITY;
+  if (!active)
+    return {"max_distance", false,
+            "The scene's diagonal is " + number(world) + ", so nothing lies beyond " +
+                number(*p.max_distance) + ".",
+            0};
+  return {"max_distance", true,
+          "Surfaces farther than " + number(*p.max_distance) + " count as open sky.", 1};
+}
+
+Effect falloff_effect(const AoState& state, const OpennessKernel& kernel) {
+  const AmbientOcclusionParameters& p = state.parameters();
+  if (p.falloff == Falloff::none)
+    return {"falloff", false, "The falloff is none: occlusion is a yes or no.", 0};
+  std::string reason = "A hit counts the less, the farther it lies.";
+  if (p.falloff == Falloff::exponential)
+    reason += " Rays end at " + number(kernel.reach() / state.scene.normalisation.scale()) +
+              ", past which a hit could change the result by less than 6e-8.";
+  return {"falloff", true, reason, 1};
+}
+
+void add_alpha_effects(const AoState& state, Plan* plan) {
+  size_t masked = 0;
+  size_t textured = 0;
+  for (const SurfaceMesh& mesh : state.scene.meshes) {
+    if (!needs_alpha_test(state.scene, mesh)) continue;
+    ++masked;
+    const Material& material = state.scene.materials[static_cast<size_t>(mesh.material)];
+    textured += material.base_color_texture.texture >= 0;
+  }
+  plan->effects.push_back(
+      {"alpha_test", masked > 0,
+       masked > 0 ? std::to_string(masked) + " meshes have points below their alpha cutoff."
+                  : "No surface has a point below an alpha cutoff.",
+       masked > 0 ? 1.0 : 0.0});
+  plan->effects.push_back({"textures", textured > 0,
+                           textured > 0 ? "Only the alpha of masked materials is read."
+                                        : "Openness depends on no texture: none is decoded.",
+                           textured > 0 ? 1.0 : 0.0});
+  for (const Material& material : state.scene.materials)
+    if (material.alpha_mode == AlphaMode::blend) {
+      plan->warnings.push_back("Surfaces with alphaMode BLEND occlude as if they were opaque.");
+      break;
+    }
+}
+
+void add_effects(const AoState& state, const OpennessKernel& kernel, Plan* plan) {
+  plan->effects = {hit_distance_effect(state), max_distance_effect(state),
+                   falloff_effect(state, kernel)};
+  add_alpha_effects(state, plan);
+  for (const char* name : {"environment", "environment_variation", "emissive_surfaces",
+                           "punctual_lights", "diffuse_bounces"})
+    plan->effects.push_back({name, false, "Openness is geometry alone and knows no light.", 0});
+}
+
+void price(const AoState& state, const Pilot& pilot, Plan* plan) {
+  const uint64_t granted =
+      std::bit_floor(std::max<uint64_t>(state.grants.max_rays_per_element, 64));
+  const uint64_t most = std::min({max_samples(state.spec), granted, uint64_t{1048576}});
+  const double target = target_error(state.spec);
+  plan->max_samples = most;
+  if (const auto limit = state.spec.accuracy.max_seconds) {
+    plan->max_samples = samples_in_time(pilot, plan->elements, target, most, *limit);
+    if (predict_seconds(pilot, plan->elements, target, plan->max_samples) > *limit)
+      plan->warnings.push_back("Even 64 samples a vertex may take longer than the " +
+                               number(*limit) + " seconds that max_seconds allows.");
+  }
+  plan->min_samples = std::min(kFirstSamples, plan->max_samples);
+  plan->predicted_s = predict_seconds(pilot, plan->elements, target, plan->max_samples);
+  const auto elements = static_cast<double>(plan->elements);
+  for (const double error : kQuotedErrors) {
+    const double samples = mean_samples(pilot, error, uint64_t{1} << 40);
+    plan->prices.push_back({error, static_cast<uint64_t>(std::ceil(samples)),
+                            samples * elements * pilot.seconds_per_ray,
+                            samples > static_cast<double>(kFirstSamples << (kPilotRounds - 1))});
+  }
+}
+
+}  // namespace
+
+Plan ao_plan(AoState& state, Progress& progress) {
+  Plan plan;
+  plan.kind = Kind::ambient_occlusion;
+  plan.isa = state.tracer->isa();
+  plan.elements = state.facets->vertices();
+  plan.element_unit = "vertex";
+  plan.reference_luminance = 1;
+  add_scene_report(state.scene.report, &plan);
+  if (state.facets->unused_vertices() > 0)
+    plan.repairs.emplace_back("vertices_of_no_triangle", state.facets->unused_vertices());
+  const OpennessParameters parameters = openness_parameters(state);
+  add_effects(state, OpennessKernel(*state.tracer, parameters), &plan);
+  const Pilot pilot = run_pilot(state, parameters, progress);
+  plan.pilot_s = pilot.seconds;
+  price(state, pilot, &plan);
+  plan.chunks = split_chunks(plan.elements, plan.predicted_s, state.grants.chunk_seconds);
+  return plan;
+}
+
+}  // namespace lightkiln
