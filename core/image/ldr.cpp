@@ -18,12 +18,17 @@ namespace {
 // The decoder grows its buffers as the file asks; this stops one that asks for more than any image
 // of the stated size can need.
 thread_local size_t g_largest_allocation = 0;
+thread_local bool g_asked_for_more = false;
 
+bool allowed(size_t size) {
+  if (size > g_largest_allocation) g_asked_for_more = true;
+  return size <= g_largest_allocation;
+}
 void* limited_malloc(size_t size) {
-  return size <= g_largest_allocation ? std::malloc(size) : nullptr;
+  return allowed(size) ? std::malloc(size) : nullptr;
 }
 void* limited_realloc(void* memory, size_t size) {
-  return size <= g_largest_allocation ? std::realloc(memory, size) : nullptr;
+  return allowed(size) ? std::realloc(memory, size) : nullptr;
 }
 
 }  // namespace
@@ -192,7 +197,8 @@ Image8 read_ldr(std::span<const std::byte> bytes) {
   const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int size = static_cast<int>(bytes.size());
   Image8 image;
-  g_largest_allocation = size_t{1} << 20;  // what reading a header takes
+  g_largest_allocation = size_t{1} << 20;  // more than reading a header takes
+  g_asked_for_more = false;
   if (!stbi_info_from_memory(data, size, &image.width, &image.height, &image.channels))
     malformed(format, stbi_failure_reason());
   check_image_size(image.width, image.height, "A " + format + " image");
@@ -204,6 +210,7 @@ Image8 read_ldr(std::span<const std::byte> bytes) {
   const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
       stbi_load_from_memory(data, size, &image.width, &image.height, &image.channels, 4),
       std::free);
+  if (!pixels && g_asked_for_more) malformed(format, "it unpacks to more than its size allows");
   if (!pixels) malformed(format, stbi_failure_reason());
   image.channels = 4;
   const size_t count = static_cast<size_t>(image.width) * static_cast<size_t>(image.height) * 4;
