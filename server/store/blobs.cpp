@@ -6,7 +6,6 @@
 #include <vector>
 
 #include <fcntl.h>
-#include <openssl/evp.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -61,33 +60,6 @@ void sweep_drafts(const fs::path& folder) {
 
 }  // namespace
 
-struct Sha256::Context {
-  EVP_MD_CTX* evp = EVP_MD_CTX_new();
-  ~Context() { EVP_MD_CTX_free(evp); }
-};
-
-Sha256::Sha256() : context_(std::make_unique<Context>()) {
-  if (!context_->evp || EVP_DigestInit_ex(context_->evp, EVP_sha256(), nullptr) != 1)
-    throw Error(ErrorCode::internal, "SHA-256 is not available.");
-}
-Sha256::~Sha256() = default;
-
-void Sha256::update(const void* data, size_t size) {
-  EVP_DigestUpdate(context_->evp, data, size);
-}
-
-std::string Sha256::digest() {
-  unsigned char bytes[32];
-  unsigned int size = 0;
-  EVP_DigestFinal_ex(context_->evp, bytes, &size);
-  std::string text(kPrefix);
-  for (const unsigned char byte : bytes) {
-    text += "0123456789abcdef"[byte >> 4];
-    text += "0123456789abcdef"[byte & 15];
-  }
-  return text;
-}
-
 Blobs::Blobs(const std::string& root) : root_(root) {
   fs::create_directories(root_ + "/incoming");
   fs::create_directories(root_ + "/quarantine");
@@ -118,7 +90,7 @@ Blobs::Draft::~Draft() {
 }
 
 void Blobs::Draft::append(const void* data, size_t size) {
-  hash_.update(data, size);
+  hash_.append(data, size);
   const char* next = static_cast<const char*>(data);
   while (size > 0) {
     const ssize_t written = write(fd_, next, size);
@@ -152,7 +124,7 @@ bool Blobs::Draft::keep() {
 
 std::string Blobs::put(std::span<const std::byte> bytes) {
   Sha256 hash;
-  hash.update(bytes.data(), bytes.size());
+  hash.append(bytes.data(), bytes.size());
   std::string digest = hash.digest();
   if (has(digest)) return digest;
   Draft draft(*this);
@@ -187,7 +159,7 @@ int Blobs::open(const std::string& digest, uint64_t* size) {
   off_t offset = 0;
   ssize_t got = 0;
   while ((got = pread(fd, piece.data(), piece.size(), offset)) > 0) {
-    hash.update(piece.data(), static_cast<size_t>(got));
+    hash.append(piece.data(), static_cast<size_t>(got));
     offset += got;
   }
   if (got < 0 || hash.digest() != digest) {
@@ -213,7 +185,7 @@ std::string Blobs::read(const std::string& digest) {
   }
   close(fd);
   Sha256 hash;
-  hash.update(bytes.data(), done);
+  hash.append(bytes.data(), done);
   if (done != size || hash.digest() != digest) {
     quarantine(digest);
     throw Error(ErrorCode::internal,

@@ -12,22 +12,9 @@
 #include <string_view>
 #include <unordered_set>
 
+#include "proto/digest.h"
+
 namespace lightkiln {
-
-// SHA-256 over bytes that arrive piece by piece.
-class Sha256 {
- public:
-  Sha256();
-  ~Sha256();
-  Sha256(const Sha256&) = delete;
-  Sha256& operator=(const Sha256&) = delete;
-  void update(const void* data, size_t size);
-  std::string digest();  // "sha256:<64 lower-case hex>"; call once
-
- private:
-  struct Context;
-  std::unique_ptr<Context> context_;
-};
 
 class Blobs {
  public:
