@@ -249,13 +249,13 @@ void SqliteStore::retry(const std::string& id) {
     // Chunks whose bytes were set aside as damaged are baked again, and assembled after that.
     for (const uint64_t index : lost)
       db.run(
-          "UPDATE tasks SET state=0, digest='', report_json='' WHERE job_id=?1 AND type=?2 AND "
-          "chunk_index=?3",
+          "UPDATE tasks SET state=0, digest='', report_json='', elements=0, error_sum_sq=0 WHERE "
+          "job_id=?1 AND type=?2 AND chunk_index=?3",
           id, static_cast<int>(TaskType::chunk), index);
     db.run("DELETE FROM tasks WHERE job_id=?1 AND type=?2", id,
            static_cast<int>(TaskType::assemble));
-    db.run("UPDATE jobs SET stage=?2, chunks_done=chunks_done-?3 WHERE id=?1", id,
-           static_cast<int>(JobStage::bake), lost.size());
+    db.run("UPDATE jobs SET stage=?2 WHERE id=?1", id, static_cast<int>(JobStage::bake));
+    sum_chunks(db, id);
   }
   writer.commit();
 }

@@ -80,6 +80,7 @@ class SqliteStore final : public Store {
   JobPosition position(Database& db, const std::string& id);  // Error{not_found}
   void move_job(Database& db, const std::string& id, JobEvent event, const std::string& reason);
   void fail_job(Database& db, const std::string& id, const JobError& error);
+  void sum_chunks(Database& db, const std::string& id);  // done, error: from the tasks
   void drop_leases(Database& db, const std::string& id);
   bool holds(Database& db, const Claim& claim);
   void expire_dead_workers(Database& db);

@@ -194,13 +194,11 @@ void SqliteStore::commit_chunk(const Claim& claim, const ChunkCommit& chunk) {
   }
   blobs_.put(chunk.bytes);  // again under the lock: an equal file may have been an orphan meanwhile
   db.run(
-      "UPDATE tasks SET state=2, lease=0, worker='', digest=?3, report_json=?4 WHERE job_id=?1 AND "
-      "type=?2 AND chunk_index=?5",
-      claim.job_id, kChunk, digest, chunk.report_json, claim.chunk_index);
-  db.run(
-      "UPDATE jobs SET chunks_done=chunks_done+1, chunk_fraction=0, error_sum_sq=error_sum_sq+?2, "
-      "error_elements=error_elements+?3 WHERE id=?1",
-      claim.job_id, chunk.error_sum_sq, chunk.elements);
+      "UPDATE tasks SET state=2, lease=0, worker='', digest=?3, report_json=?4, elements=?6, "
+      "error_sum_sq=?7 WHERE job_id=?1 AND type=?2 AND chunk_index=?5",
+      claim.job_id, kChunk, digest, chunk.report_json, claim.chunk_index, chunk.elements,
+      chunk.error_sum_sq);
+  sum_chunks(db, claim.job_id);
   const int64_t left =
       db.number(0, "SELECT chunks_total-chunks_done FROM jobs WHERE id=?1", claim.job_id);
   const auto job = read_job(db, claim.job_id);
@@ -211,7 +209,6 @@ void SqliteStore::commit_chunk(const Claim& claim, const ChunkCommit& chunk) {
                 .count("total", job->chunks_total)
                 .number("error", job->current_error)
                 .take());
-  touch(db, claim.job_id);
   if (left == 0) {
     db.run("INSERT INTO tasks(job_id,type,chunk_index) VALUES(?1,?2,0)", claim.job_id, kAssemble);
     move_job(db, claim.job_id, JobEvent::last_chunk_committed, "");
