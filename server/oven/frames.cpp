@@ -182,7 +182,7 @@ void Channel::send_piece(std::string_view bytes, int descriptor) {
     } else if (errno == EAGAIN) {
       wait_for(POLLOUT, kPollMs);
     } else if (errno != EINTR) {
-      throw Error(ErrorCode::unavailable, "The other end of the oven's pipe is gone.");
+      throw PeerGone();
     }
   }
 }
@@ -215,7 +215,7 @@ void Channel::read_some() {
     descriptors_.emplace_back(descriptor);
   }
   if (descriptors_.size() > kMaxWaitingDescriptors) malformed("too many descriptors");
-  if (got <= 0) throw Error(ErrorCode::unavailable, "The other end of the oven's pipe is gone.");
+  if (got <= 0) throw PeerGone();
   parser_.feed({buffer.data(), static_cast<size_t>(got)});
 }
 

@@ -97,16 +97,22 @@ class FrameParser {
   std::deque<Frame> complete_;
 };
 
+// The other end of the pipe is gone.
+class PeerGone : public Error {
+ public:
+  PeerGone() : Error(ErrorCode::unavailable, "The other end of the oven's pipe is gone.") {}
+};
+
 // One end of the socket pair. send() may be called from several threads; receive() from one.
 class Channel {
  public:
   // `interrupted` is asked while waiting; once true, send and receive throw Error{cancelled}.
   explicit Channel(Descriptor socket, std::function<bool()> interrupted = {});
 
-  // Throws Error{unavailable} when the other end is gone.
+  // Throws PeerGone, Error{too_large}.
   void send(FrameType type, std::string_view payload, int descriptor = -1);
-  // The next frame, or nothing after `wait_ms` (negative = for ever). Throws Error{unavailable} at
-  // the end of the stream.
+  // The next frame, or nothing after `wait_ms` (negative = for ever). Throws PeerGone at the end
+  // of the stream.
   std::optional<Frame> receive(int wait_ms);
   // Whether bytes (or the end) wait to be read.
   bool readable() const;

@@ -2,9 +2,10 @@
 
 #include <new>
 #include <optional>
+#include <system_error>
 
 #include <sys/mman.h>
-#include <sys/stat.h>
+#include <unistd.h>
 
 #include "core/base/parallel.h"
 #include "proto/json.h"
@@ -20,10 +21,9 @@ constexpr double kProgressEvery_s = 0.05;
 class Mapping {
  public:
   explicit Mapping(const Descriptor& blob) {
-    struct stat info {};
-    if (fstat(blob.get(), &info) != 0)
-      throw Error(ErrorCode::internal, "An input's size cannot be read.");
-    size_ = static_cast<size_t>(info.st_size);
+    const off_t end = lseek(blob.get(), 0, SEEK_END);
+    if (end < 0) throw Error(ErrorCode::internal, "An input's size cannot be read.");
+    size_ = static_cast<size_t>(end);
     if (size_ == 0) return;
     void* memory = mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, blob.get(), 0);
     if (memory == MAP_FAILED) throw std::bad_alloc();
@@ -216,6 +216,13 @@ int serve_oven(Channel& channel, const std::vector<std::string>& missing_layers)
     } catch (const std::bad_alloc&) {
       send_error(channel, error_code_name(ErrorCode::out_of_memory),
                  "The job needs more memory than an oven may take.", "");
+      return 1;
+    } catch (const std::system_error& error) {
+      // The C++ library reports a thread that found no room for its stack this way.
+      const bool no_room = error.code() == std::errc::resource_unavailable_try_again ||
+                           error.code() == std::errc::not_enough_memory;
+      send_error(channel, error_code_name(no_room ? ErrorCode::out_of_memory : ErrorCode::internal),
+                 error.what(), "");
       return 1;
     } catch (const std::exception& error) {
       send_error(channel, error_code_name(ErrorCode::internal), error.what(), "");

@@ -101,7 +101,6 @@ constexpr int kAllowedCalls[] = {
     SCMP_SYS(poll),
     SCMP_SYS(ppoll),
     SCMP_SYS(close),
-    SCMP_SYS(fstat),
     SCMP_SYS(lseek),
     SCMP_SYS(munmap),
     SCMP_SYS(mremap),

@@ -49,6 +49,7 @@ class SqliteStore final : public Store {
 
   std::optional<Claim> claim(const std::string& worker, const std::string& prefer_job) override;
   bool heartbeat(const Claim& claim, double fraction) override;
+  bool holds_lease(const Claim& claim) override;
   void commit_plan(const Claim& claim, const std::string& plan_json, uint64_t chunks,
                    double predicted_s) override;
   void commit_chunk(const Claim& claim, const ChunkCommit& chunk) override;

@@ -158,6 +158,11 @@ bool SqliteStore::heartbeat(const Claim& claim, double fraction) {
   return true;
 }
 
+bool SqliteStore::holds_lease(const Claim& claim) {
+  ReadAccess read(*this);
+  return holds(read.db(), claim);
+}
+
 // --- commits -------------------------------------------------------------------------------------
 
 void SqliteStore::commit_plan(const Claim& claim, const std::string& plan_json, uint64_t chunks,

@@ -188,6 +188,8 @@ class Store {
   virtual std::optional<Claim> claim(const std::string& worker, const std::string& prefer_job) = 0;
   // Extends the lease. Returns false when it is lost or the job is cancelled: stop at once.
   virtual bool heartbeat(const Claim& claim, double fraction) = 0;
+  // What heartbeat() would answer, by reading alone: cheap enough to ask ten times a second.
+  virtual bool holds_lease(const Claim& claim) = 0;
   virtual void commit_plan(const Claim& claim, const std::string& plan_json, uint64_t chunks,
                            double predicted_s) = 0;
   virtual void commit_chunk(const Claim& claim, const ChunkCommit& chunk) = 0;

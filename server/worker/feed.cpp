@@ -1,0 +1,155 @@
+#include "server/worker/feed.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <set>
+
+#include "proto/json.h"
+
+namespace lightkiln {
+
+namespace {
+
+constexpr size_t kMaxDetailBytes = 1000;
+constexpr size_t kMaxNameBytes = 128;
+constexpr size_t kMaxArtifacts = 100'000;
+
+[[noreturn]] void refuse(const std::string& what) {
+  throw OvenFailure{{error_code_name(ErrorCode::internal), what, ""}, false};
+}
+
+// An oven has read a client's file: what it says is checked like anything else from outside.
+std::string cleaned(std::string_view text) {
+  std::string clean(text.substr(0, kMaxDetailBytes));
+  for (char& c : clean)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+  return clean;
+}
+
+bool is_known_code(std::string_view code) {
+  for (int i = 0; i <= static_cast<int>(ErrorCode::internal); ++i)
+    if (code == error_code_name(static_cast<ErrorCode>(i))) return true;
+  return false;
+}
+
+bool is_good_name(std::string_view name) {
+  return !name.empty() && name.size() <= kMaxNameBytes && name[0] != '.' &&
+         name.find_first_not_of(
+             "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-") ==
+             std::string_view::npos;
+}
+
+[[noreturn]] void throw_failure(const Frame& frame) {
+  PayloadReader reader(frame.payload);
+  OvenFailure failure;
+  failure.error.code = cleaned(reader.text());
+  failure.error.detail = cleaned(reader.text());
+  failure.error.pointer = cleaned(reader.text());
+  if (!is_known_code(failure.error.code) ||
+      failure.error.code == error_code_name(ErrorCode::internal)) {
+    std::fprintf(stderr, "oven: %s: %s\n", failure.error.code.c_str(),
+                 failure.error.detail.c_str());
+    failure.error = {error_code_name(ErrorCode::internal),
+                     "The bake failed by a mistake of Lightkiln's own; the worker's log has more.",
+                     ""};
+  }
+  failure.crashed = failure.error.code == error_code_name(ErrorCode::out_of_memory);
+  throw failure;
+}
+
+// Passes progress on until a frame of type `expected` comes.
+Frame await(OvenProcess& oven, FrameType expected, const OnProgress& on_progress) {
+  for (;;) {
+    Frame frame = *oven.channel().receive(-1);
+    if (frame.type == expected) return frame;
+    if (frame.type == FrameType::error) throw_failure(frame);
+    if (frame.type != FrameType::progress) refuse("The oven answered out of turn.");
+    on_progress(std::clamp(PayloadReader(frame.payload).real(), 0.0, 1.0));
+  }
+}
+
+}  // namespace
+
+void feed_job(OvenProcess& oven, Store& store, const Claim& claim, const FeedOptions& options,
+              const OnProgress& on_progress) {
+  const ParsedSpec parsed = parse_spec(claim.spec_json);
+  for (const std::string& digest : input_digests(parsed.spec)) {
+    uint64_t size = 0;
+    const Descriptor blob(store.open_blob(digest, &size));
+    oven.channel().send(FrameType::input, PayloadWriter().text(digest).take(), blob.get());
+  }
+  oven.channel().send(FrameType::load, PayloadWriter()
+                                           .text(claim.spec_json)
+                                           .number(static_cast<uint64_t>(options.threads))
+                                           .number(options.memory_bytes)
+                                           .real(options.chunk_seconds)
+                                           .take());
+  await(oven, FrameType::loaded, on_progress);
+}
+
+PlanAnswer feed_plan(OvenProcess& oven, const OnProgress& on_progress) {
+  oven.channel().send(FrameType::plan, {});
+  const Frame frame = await(oven, FrameType::plan_result, on_progress);
+  PayloadReader reader(frame.payload);
+  PlanAnswer answer;
+  answer.plan_json = reader.text();
+  answer.chunks = reader.number();
+  answer.predicted_s = reader.real();
+  reader.end();
+  if (answer.chunks < 1 || answer.chunks > 1'000'000) refuse("The oven planned no chunks.");
+  return answer;
+}
+
+void feed_known_plan(OvenProcess& oven, const std::string& plan_json) {
+  oven.channel().send(FrameType::use_plan, PayloadWriter().text(plan_json).take());
+}
+
+ChunkCommit feed_chunk(OvenProcess& oven, uint64_t index, const OnProgress& on_progress) {
+  oven.channel().send(FrameType::chunk, PayloadWriter().number(index).take());
+  const Frame frame = await(oven, FrameType::chunk_result, on_progress);
+  PayloadReader reader(frame.payload);
+  ChunkCommit commit;
+  commit.bytes = reader.bytes();
+  commit.report_json = reader.text();
+  commit.elements = reader.number();
+  commit.error_sum_sq = reader.real();
+  reader.end();
+  return commit;
+}
+
+ResultAnswer feed_assembly(OvenProcess& oven, Store& store, const std::string& job_id,
+                           const OnProgress& on_progress) {
+  for (const StoredChunk& chunk : store.load_chunks(job_id))
+    oven.channel().send(FrameType::stored_chunk,
+                        PayloadWriter().bytes(chunk.bytes).text(chunk.report_json).take());
+  oven.channel().send(FrameType::assemble, {});
+  ResultAnswer answer;
+  std::set<std::string> names;
+  for (;;) {
+    Frame frame = *oven.channel().receive(-1);
+    PayloadReader reader(frame.payload);
+    if (frame.type == FrameType::error) throw_failure(frame);
+    if (frame.type == FrameType::progress) {
+      on_progress(std::clamp(reader.real(), 0.0, 1.0));
+    } else if (frame.type == FrameType::artifact) {
+      NewArtifact artifact;
+      artifact.name = reader.text();
+      artifact.role = cleaned(reader.text());
+      artifact.media_type = cleaned(reader.text());
+      artifact.bytes = reader.bytes();
+      reader.end();
+      if (!is_good_name(artifact.name) || !names.insert(artifact.name).second ||
+          names.size() > kMaxArtifacts)
+        refuse("The oven gave an artifact a name that is not allowed or not unique.");
+      answer.artifacts.push_back(std::move(artifact));
+    } else if (frame.type == FrameType::result) {
+      answer.accuracy_json = reader.text();
+      reader.end();
+      return answer;
+    } else {
+      refuse("The oven answered out of turn.");
+    }
+  }
+}
+
+}  // namespace lightkiln

@@ -1,0 +1,242 @@
+#include "server/worker/worker.h"
+
+#include <csignal>
+#include <cstdio>
+#include <limits>
+#include <memory>
+
+#include "core/base/parallel.h"
+#include "server/store/job_id.h"
+#include "server/worker/feed.h"
+#include "server/worker/heartbeat.h"
+
+namespace lightkiln {
+
+namespace {
+
+constexpr int64_t kIdleWaitMs = 500;
+constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr int kCancelGraceMs = 1000;  // from a polite request to SIGKILL
+
+volatile std::sig_atomic_t g_signalled = 0;
+
+// SIGTERM and SIGINT ask for an orderly end; the handlers of before come back afterwards.
+class StopSignals {
+ public:
+  StopSignals() {
+    g_signalled = 0;
+    struct sigaction action {};
+    action.sa_handler = [](int) { g_signalled = 1; };
+    sigaction(SIGTERM, &action, &term_);
+    sigaction(SIGINT, &action, &int_);
+  }
+  ~StopSignals() {
+    sigaction(SIGTERM, &term_, nullptr);
+    sigaction(SIGINT, &int_, nullptr);
+  }
+  StopSignals(const StopSignals&) = delete;
+  StopSignals& operator=(const StopSignals&) = delete;
+
+ private:
+  struct sigaction term_ {
+  }, int_{};
+};
+
+class Worker {
+ public:
+  explicit Worker(const WorkerOptions& options)
+      : options_(options),
+        store_(open_sqlite_store(store_options(options))),
+        name_((options.name.empty() ? "worker" : options.name) + "-" + random_hex(8)) {}
+
+  int run() {
+    prepare_spare();
+    report_missing_layers();
+    while (!stopping()) {
+      prepare_spare();
+      const std::optional<Claim> claim = next_claim();
+      if (claim) {
+        work(*claim);
+      } else {
+        end_oven();
+        if (options_.exit_when_idle) break;
+        store_->wait_for_work(kIdleWaitMs);
+      }
+    }
+    return 0;
+  }
+
+ private:
+  static StoreOptions store_options(const WorkerOptions& options) {
+    StoreOptions store;
+    store.directory = options.store_directory;
+    store.lease_ms = options.lease_ms;
+    return store;
+  }
+
+  bool stopping() const { return g_signalled != 0 || (options_.stop && options_.stop->load()); }
+  bool timed_out() const { return wall_seconds() > deadline_s_; }
+  bool interrupted() const {
+    return stopping() || timed_out() || (heartbeat_ && heartbeat_->lost());
+  }
+
+  // A busy store is waited for: it is no reason to end.
+  std::optional<Claim> next_claim() {
+    try {
+      return store_->claim(name_, oven_job_);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::unavailable) throw;
+      std::fprintf(stderr, "worker: %s\n", error.what());
+      return std::nullopt;
+    }
+  }
+
+  std::unique_ptr<OvenProcess> start_oven() {
+    return std::make_unique<OvenProcess>(
+        OvenOptions{options_.oven_path, options_.oven_memory_bytes},
+        [this] { return interrupted(); });
+  }
+  void prepare_spare() {
+    if (spare_ && !spare_->ended()) return;
+    spare_greeted_ = false;
+    spare_ = start_oven();
+  }
+  void end_oven() {
+    oven_.reset();
+    oven_job_.clear();
+  }
+
+  void report_missing_layers() {
+    const std::optional<Frame> hello = spare_->channel().receive(10'000);
+    if (!hello || hello->type != FrameType::hello)
+      throw Error(ErrorCode::unavailable, "The oven '" + options_.oven_path + "' does not answer.");
+    PayloadReader reader(hello->payload);
+    for (uint64_t left = reader.number(); left > 0; --left)
+      std::fprintf(stderr, "worker: the oven's sandbox lacks a layer: %s\n",
+                   std::string(reader.text()).c_str());
+    spare_greeted_ = true;
+  }
+
+  // The oven that holds the claim's job, loading it into the spare one when there is none.
+  OvenProcess& oven_for(const Claim& claim) {
+    if (oven_ && oven_job_ == claim.job_id) return *oven_;
+    end_oven();
+    prepare_spare();
+    oven_ = std::move(spare_);
+    oven_job_ = claim.job_id;
+    const bool greeted = std::exchange(spare_greeted_, false);
+    if (!greeted && oven_->channel().receive(-1)->type != FrameType::hello)
+      throw OvenFailure{{"oven_crashed", "The oven did not greet its worker.", ""}, true};
+    const FeedOptions feed{options_.threads, options_.oven_memory_bytes, options_.chunk_seconds};
+    feed_job(*oven_, *store_, claim, feed, on_progress());
+    if (claim.type != TaskType::plan) feed_known_plan(*oven_, claim.plan_json);
+    return *oven_;
+  }
+
+  OnProgress on_progress() {
+    return [this](double fraction) { heartbeat_->set_fraction(fraction); };
+  }
+
+  void bake(const Claim& claim) {
+    OvenProcess& oven = oven_for(claim);
+    switch (claim.type) {
+      case TaskType::plan: {
+        const PlanAnswer plan = feed_plan(oven, on_progress());
+        store_->commit_plan(claim, plan.plan_json, plan.chunks, plan.predicted_s);
+        return;
+      }
+      case TaskType::chunk:
+        store_->commit_chunk(claim, feed_chunk(oven, claim.chunk_index, on_progress()));
+        return;
+      case TaskType::assemble: {
+        const ResultAnswer answer = feed_assembly(oven, *store_, claim.job_id, on_progress());
+        store_->commit_result(claim, answer.artifacts, answer.accuracy_json);
+        end_oven();
+        return;
+      }
+    }
+  }
+
+  void work(const Claim& claim) {
+    try {
+      try_to_bake(claim);
+    } catch (const Error& error) {
+      // The store did not take the outcome; the lease runs out and the task is done again.
+      std::fprintf(stderr, "worker: %s\n", error.what());
+      end_oven();
+    }
+    heartbeat_.reset();
+    deadline_s_ = kNever;
+  }
+
+  void try_to_bake(const Claim& claim) {
+    deadline_s_ = wall_seconds() + options_.task_seconds;
+    heartbeat_ = std::make_unique<Heartbeat>(*store_, claim, options_.lease_ms);
+    try {
+      bake(claim);
+    } catch (const OvenFailure& failure) {
+      end_oven();
+      store_->fail_task(claim, failure.error, failure.crashed);
+    } catch (const PeerGone&) {
+      const OvenDeath death = oven_->bury();
+      end_oven();
+      store_->fail_task(claim, {death.code, death.sentence, ""}, true);
+    } catch (const Error& error) {
+      if (error.code() == ErrorCode::cancelled)
+        give_up(claim);
+      else
+        fail_here(claim, error);
+    }
+  }
+
+  // The work was interrupted: the job is cancelled, the lease lost, the worker asked to end, or the
+  // task's time is over.
+  void give_up(const Claim& claim) {
+    const bool lost = heartbeat_->lost();
+    const bool late = !lost && !stopping();
+    if (oven_) oven_->stop(stopping() ? 0 : kCancelGraceMs);
+    end_oven();
+    if (late)
+      store_->fail_task(claim,
+                        {error_code_name(ErrorCode::timed_out),
+                         "A task of this job took longer than the " +
+                             std::to_string(static_cast<int>(options_.task_seconds)) +
+                             " s that this worker allows.",
+                         ""},
+                        true);
+    else if (!lost)
+      store_->release(claim);
+  }
+
+  // The store failed, or this program did.
+  void fail_here(const Claim& claim, const Error& error) {
+    std::fprintf(stderr, "worker: %s\n", error.what());
+    end_oven();
+    if (error.code() == ErrorCode::unavailable)
+      return store_->release(claim);  // busy or full: the task is not to blame
+    store_->fail_task(
+        claim,
+        {error_code_name(ErrorCode::internal),
+         "The bake failed by a mistake of Lightkiln's own; the worker's log has more.", ""},
+        false);
+  }
+
+  const WorkerOptions options_;
+  std::unique_ptr<Store> store_;
+  const std::string name_;
+  std::unique_ptr<OvenProcess> oven_;  // holds oven_job_
+  std::string oven_job_;
+  std::unique_ptr<OvenProcess> spare_;  // started, sandboxed, waiting
+  bool spare_greeted_ = false;          // its hello was read
+  std::unique_ptr<Heartbeat> heartbeat_;
+  double deadline_s_ = kNever;
+};
+
+}  // namespace
+
+int run_worker(const WorkerOptions& options) {
+  const StopSignals signals;
+  return Worker(options).run();
+}
+
+}  // namespace lightkiln
