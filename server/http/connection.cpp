@@ -7,9 +7,6 @@
 #include <sys/sendfile.h>
 #include <sys/socket.h>
 #include <unistd.h>
-
-#include "core/base/error.h"
-
 namespace lightkiln {
 
 std::shared_ptr<const int> own_descriptor(int descriptor) {
@@ -90,11 +87,11 @@ size_t SocketBody::read(char* data, size_t size) {
       break;
     }
     if (received == 0 || (errno != EINTR && !would_block()))
-      throw Error(ErrorCode::invalid_input, "The connection closed before the whole body arrived.");
+      throw HttpRefusal{400, "The connection closed before the whole body arrived."};
     const auto now = Clock::now();
     if (too_slow(start_, now, got_, grace_ms_, least_bytes_per_s_) ||
         ms_since(last, now) > stall_ms_)
-      throw Error(ErrorCode::timed_out, "The body arrived too slowly.");
+      throw HttpRefusal{408, "The body arrived too slowly."};
     pollfd waited{connection_.fd, POLLIN, 0};
     ::poll(&waited, 1, 250);
   }

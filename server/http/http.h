@@ -37,8 +37,14 @@ struct HttpHead {
   const std::string* parameter(std::string_view name) const;
 };
 
+// Thrown by what serves a request to answer it with a status of the HTTP layer's own.
+struct HttpRefusal {
+  int status = 400;
+  std::string detail;
+};
+
 // A body that is read while it arrives. read() gives at most `size` bytes, 0 at the end, and throws
-// Error{timed_out} when the peer is slower than the fence allows, {invalid_input} when it hangs up.
+// HttpRefusal when the peer is slower than the fence allows (408) or hangs up (400).
 class BodyReader {
  public:
   virtual ~BodyReader() = default;

@@ -85,7 +85,8 @@ void Loop::stop(int64_t drain_ms) {
 void Loop::run() {
   std::vector<epoll_event> events(256);
   for (;;) {
-    const int timeout = connections_.empty() && listener_armed_ && accepting_ ? -1 : kSweepMs;
+    int timeout = connections_.empty() && listener_armed_ && accepting_ ? -1 : kSweepMs;
+    if (!pipelined_.empty()) timeout = 0;
     const int count = ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), timeout);
     for (int i = 0; i < count; ++i) {
       const int fd = events[static_cast<size_t>(i)].data.fd;
@@ -98,6 +99,7 @@ void Loop::run() {
       if (found != connections_.end()) on_event(*found->second);
     }
     take_finished();
+    take_pipelined();
     const auto now = Clock::now();
     if (ms_since(last_sweep_, now) >= kSweepMs || !accepting_) sweep();
     if (accepting_) continue;

@@ -33,6 +33,7 @@ class Loop {
   void accept_all();
   void on_event(Connection& c);
   void take_finished();
+  void take_pipelined();
   void sweep();
   void sweep_one(Connection& c, Clock::time_point now);
 
@@ -63,6 +64,7 @@ class Loop {
   bool listener_armed_ = false;
   std::unordered_map<int, std::unique_ptr<Connection>> connections_;  // by descriptor
   std::unordered_map<std::string, int> per_address_;
+  std::vector<int> pipelined_;  // descriptors with a further request already received
   uint64_t reserved_ = 0;
   int uploads_ = 0;
 

@@ -156,6 +156,8 @@ void Loop::work(Connection& c) {
   HttpReply answer;
   try {
     answer = application_.handle(c.request);
+  } catch (const HttpRefusal& refusal) {
+    answer = status_reply(refusal.status, refusal.detail, c.request.head.request_id);
   } catch (const Error& error) {
     answer = error_reply(error, c.request.head.request_id);
   } catch (const std::exception&) {
@@ -231,8 +233,20 @@ void Loop::finish_reply(Connection& c) {
   }
   c.request = HttpRequest();
   c.enter(Phase::head);
-  if (!c.in.empty()) return advance(c);
+  // Not at once: a long pipeline would nest as deep as it is long.
+  if (!c.in.empty()) return pipelined_.push_back(c.fd);
   arm(c, false);
+}
+
+void Loop::take_pipelined() {
+  std::vector<int> ready;
+  ready.swap(pipelined_);
+  for (const int fd : ready) {
+    const auto found = connections_.find(fd);
+    if (found == connections_.end()) continue;
+    Connection& c = *found->second;
+    if (c.phase == Phase::head && !c.in.empty()) advance(c);
+  }
 }
 
 void Loop::drain(Connection& c) {
