@@ -40,8 +40,7 @@ Admission refused(HttpReply reply) {
 }
 
 HttpReply no_such_route(const HttpHead& head, const std::vector<std::string>& allowed) {
-  if (allowed.empty())
-    return status_reply(404, "There is nothing at this path.", head.request_id);
+  if (allowed.empty()) return status_reply(404, "There is nothing at this path.", head.request_id);
   std::string list;
   for (const std::string& method : allowed) list += (list.empty() ? "" : ", ") + method;
   HttpReply reply =
@@ -86,14 +85,15 @@ Admission Api::Impl::admit(const HttpHead& head) {
   if (const char* name = unknown_parameter(head, route)) {
     std::string allowed;
     for (const char* one : route.query) allowed += std::string(allowed.empty() ? "" : ", ") + one;
-    return refused(status_reply(400,
-                                "The query parameter '" + std::string(name) + "' is not known; " +
-                                    (allowed.empty() ? "none is taken." : "allowed: " + allowed + "."),
-                                head.request_id));
+    return refused(
+        status_reply(400,
+                     "The query parameter '" + std::string(name) + "' is not known; " +
+                         (allowed.empty() ? "none is taken." : "allowed: " + allowed + "."),
+                     head.request_id));
   }
   if (route.body == BodyRule::buffered && !is_json(head))
-    return refused(status_reply(415, "Send the body as Content-Type: application/json.",
-                                head.request_id));
+    return refused(
+        status_reply(415, "Send the body as Content-Type: application/json.", head.request_id));
   Admission admission;
   admission.body = route.body;
   if (route.body == BodyRule::buffered) admission.body_limit = kMaxRequestBytes;
@@ -121,9 +121,8 @@ HttpReply Api::Impl::handle(HttpRequest& request) {
 }
 
 void Api::Impl::log_failure(const HttpHead& head, std::string_view what) {
-  context.log.write(
-      LogLevel::error, "failure",
-      {{"request_id", std::string_view(head.request_id)}, {"detail", what}});
+  context.log.write(LogLevel::error, "failure",
+                    {{"request_id", std::string_view(head.request_id)}, {"detail", what}});
 }
 
 // Reads are frequent and say little: they are logged only on demand, or when they fail.
@@ -156,7 +155,9 @@ HttpApplication Api::application() {
           [this](const ServedRequest& request) { impl_->served(request); }};
 }
 
-void Api::stop_waiting() { impl_->context.waiters.stop(); }
+void Api::stop_waiting() {
+  impl_->context.waiters.stop();
+}
 
 std::vector<RouteInfo> Api::routes() const {
   std::vector<RouteInfo> result;

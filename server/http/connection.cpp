@@ -16,7 +16,9 @@ std::shared_ptr<const int> own_descriptor(int descriptor) {
   });
 }
 
-Connection::~Connection() { ::close(fd); }
+Connection::~Connection() {
+  ::close(fd);
+}
 
 bool too_slow(Clock::time_point start, Clock::time_point now, uint64_t bytes, int64_t grace_ms,
               uint64_t least_bytes_per_s) {
@@ -27,7 +29,9 @@ bool too_slow(Clock::time_point start, Clock::time_point now, uint64_t bytes, in
 
 namespace {
 
-bool would_block() { return errno == EAGAIN || errno == EWOULDBLOCK; }
+bool would_block() {
+  return errno == EAGAIN || errno == EWOULDBLOCK;
+}
 
 // One turn sends a bounded part of a file, so that a fast reader does not hold up the others.
 constexpr size_t kFileTurnBytes = 512 * 1024;

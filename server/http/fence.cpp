@@ -31,6 +31,8 @@ int Fence::listen(const std::string& host, int port) {
   return bound;
 }
 
-void Fence::stop(int64_t drain_ms) { impl_->loop.stop(drain_ms); }
+void Fence::stop(int64_t drain_ms) {
+  impl_->loop.stop(drain_ms);
+}
 
 }  // namespace lightkiln

@@ -24,13 +24,13 @@ namespace lightkiln {
 
 struct FenceLimits {
   HeadLimits head;
-  int64_t head_ms = 5000;                    // from the first byte (or accept) to the end of a head
-  int64_t idle_ms = 30000;                   // of a kept connection between requests
-  int64_t grace_ms = 5000;                   // before a least rate is asked of a body or a reader
-  uint64_t least_bytes_per_s = 16 * 1024;    // after that, on average
-  int64_t stall_ms = 10000;                  // without one byte of a reply taken or an upload sent
-  int64_t drain_ms = 2000;                   // given to a refused peer to finish talking
-  uint64_t buffered_body_bytes = 1u << 20;   // above: only streamed, with a pool thread
+  int64_t head_ms = 5000;                   // from the first byte (or accept) to the end of a head
+  int64_t idle_ms = 30000;                  // of a kept connection between requests
+  int64_t grace_ms = 5000;                  // before a least rate is asked of a body or a reader
+  uint64_t least_bytes_per_s = 16 * 1024;   // after that, on average
+  int64_t stall_ms = 10000;                 // without one byte of a reply taken or an upload sent
+  int64_t drain_ms = 2000;                  // given to a refused peer to finish talking
+  uint64_t buffered_body_bytes = 1u << 20;  // above: only streamed, with a pool thread
   uint64_t buffered_bytes_total = 64u << 20;  // of all bodies being buffered; above: 503
   int requests_per_connection = 1000;
   int connections = 256;

@@ -63,9 +63,9 @@ std::vector<Scope> parse_scopes(const std::string& text, const std::string& wher
       known = true;
     }
     if (!known)
-      throw Error(ErrorCode::invalid_input,
-                  where + ": '" + word +
-                      "' is no scope; allowed: read, submit, cancel, metrics, admin.");
+      throw Error(
+          ErrorCode::invalid_input,
+          where + ": '" + word + "' is no scope; allowed: read, submit, cancel, metrics, admin.");
   }
   return scopes;
 }

@@ -16,7 +16,9 @@ bool is_token(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), is_token_char);
 }
 
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+char lower(char c) {
+  return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+}
 std::string lower(std::string_view text) {
   std::string result(text);
   for (char& c : result) c = lower(c);
@@ -37,7 +39,9 @@ int hex_value(char c) {
   return -1;
 }
 
-HeadFault bad(std::string detail) { return {400, std::move(detail)}; }
+HeadFault bad(std::string detail) {
+  return {400, std::move(detail)};
+}
 
 std::optional<HeadFault> parse_query(std::string_view text, HttpHead& head) {
   while (!text.empty()) {
@@ -100,7 +104,8 @@ std::optional<HeadFault> parse_header_line(std::string_view line, HttpHead& head
   const size_t colon = line.find(':');
   if (colon == std::string_view::npos) return bad("A header line has no colon.");
   const std::string_view name = line.substr(0, colon);
-  if (!is_token(name)) return bad("A header name is empty or holds a space or another illegal byte.");
+  if (!is_token(name))
+    return bad("A header name is empty or holds a space or another illegal byte.");
   const std::string_view value = trim(line.substr(colon + 1));
   for (const char c : value)
     if ((c >= 0 && c < 0x20 && c != '\t') || c == 0x7f)
@@ -183,8 +188,8 @@ HeadScan scan_head(std::string_view bytes, const HeadLimits& limits) {
     }
     if (lines == 0 && line > limits.request_line) break;
     if (++lines > limits.lines)
-      return {0, HeadFault{431, "A request head may have at most " +
-                                    std::to_string(limits.lines) + " lines."}};
+      return {0, HeadFault{431, "A request head may have at most " + std::to_string(limits.lines) +
+                                    " lines."}};
     line_start = feed + 1;
   }
   if (lines == 0 && bytes.size() > limits.request_line + 2)

@@ -15,10 +15,10 @@
 namespace lightkiln {
 
 struct HeadLimits {
-  size_t bytes = 16 * 1024;   // of the whole head
-  size_t lines = 64;          // headers and request line
+  size_t bytes = 16 * 1024;    // of the whole head
+  size_t lines = 64;           // headers and request line
   size_t request_line = 1024;  // bytes
-  size_t range = 64;          // bytes of a Range header's value
+  size_t range = 64;           // bytes of a Range header's value
 };
 
 // Why a head is refused, for a problem document.

@@ -58,8 +58,8 @@ JobMessage job_message(const JobRecord& job, const std::vector<ArtifactRecord>& 
   message.predicted_s = job.predicted_s;
   message.from_cache = job.from_cache;
   message.attempts = job.attempts;
-  if (job.error) message.error = JobErrorMessage{job.error->code, job.error->detail,
-                                                 job.error->pointer};
+  if (job.error)
+    message.error = JobErrorMessage{job.error->code, job.error->detail, job.error->pointer};
   message.created_ms = job.created_ms;
   message.started_ms = job.started_ms;
   message.finished_ms = job.finished_ms;
@@ -69,7 +69,9 @@ JobMessage job_message(const JobRecord& job, const std::vector<ArtifactRecord>& 
   return message;
 }
 
-std::string job_etag(const JobRecord& job) { return kJobTag + std::to_string(job.version) + '"'; }
+std::string job_etag(const JobRecord& job) {
+  return kJobTag + std::to_string(job.version) + '"';
+}
 
 std::string list_etag(uint64_t list_version) {
   return std::string("\"list-") + LIGHTKILN_VERSION + '-' + std::to_string(list_version) + '"';

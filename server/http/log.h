@@ -1,7 +1,8 @@
 #pragma once
 
-// The log: one JSON object a line on standard error. Texts are escaped and cut at 256 bytes, so that
-// no client can forge a line or fill the disk with one. Secrets and file paths are never handed in.
+// The log: one JSON object a line on standard error. Texts are escaped and cut at 256 bytes, so
+// that no client can forge a line or fill the disk with one. Secrets and file paths are never
+// handed in.
 
 #include <initializer_list>
 #include <mutex>

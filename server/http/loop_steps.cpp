@@ -26,8 +26,8 @@ constexpr uint64_t kDrainBytes = 32u << 20;
 std::string request_id_of(const HttpHead& head) {
   const std::string* given = head.header("x-request-id");
   const auto plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-           c == '-' || c == '_' || c == '.';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_' || c == '.';
   };
   if (given && !given->empty() && given->size() <= 64 &&
       std::all_of(given->begin(), given->end(), plain))
@@ -112,8 +112,9 @@ void Loop::begin_body(Connection& c, const Admission& admission) {
   if (length > 0 && admission.body == BodyRule::none)
     return refuse(c, 413, "This request takes no body.");
   if (length > admission.body_limit)
-    return refuse(c, 413, "The body may be at most " + std::to_string(admission.body_limit) +
-                              " bytes long; Content-Length says " + std::to_string(length) + ".");
+    return refuse(c, 413,
+                  "The body may be at most " + std::to_string(admission.body_limit) +
+                      " bytes long; Content-Length says " + std::to_string(length) + ".");
   const bool streamed =
       admission.body == BodyRule::streamed && length > limits_.buffered_body_bytes;
   if (streamed && uploads_ >= limits_.uploads)

@@ -1,6 +1,7 @@
 #pragma once
 
-// A fixed number of threads behind a bounded queue: when it is full the caller is told, and says 503.
+// A fixed number of threads behind a bounded queue: when it is full the caller is told, and says
+// 503.
 
 #include <condition_variable>
 #include <cstddef>

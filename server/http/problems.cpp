@@ -4,7 +4,9 @@ namespace lightkiln {
 
 namespace {
 
-std::string instance_of(const std::string& request_id) { return "urn:request:" + request_id; }
+std::string instance_of(const std::string& request_id) {
+  return "urn:request:" + request_id;
+}
 
 }  // namespace
 

@@ -84,9 +84,8 @@ HttpReply file_reply(const HttpHead& head, FileBody file, const std::string& dig
     range = parse_range(*wanted, file.length);
   const std::string size = std::to_string(file.length);
   if (range.kind == RangeKind::unsatisfiable) {
-    HttpReply refusal =
-        status_reply(416, "The range begins beyond the end; the size is " + size + " bytes.",
-                     head.request_id);
+    HttpReply refusal = status_reply(
+        416, "The range begins beyond the end; the size is " + size + " bytes.", head.request_id);
     return refusal.set("Content-Range", "bytes */" + size);
   }
   HttpReply reply;

@@ -18,9 +18,10 @@ class Router {
   void add(std::string method, std::string_view pattern);
 
   struct Match {
-    int route = -1;                    // -1: none
-    std::vector<std::string> values;   // of the pattern's parameters, in order
-    std::vector<std::string> allowed;  // methods of the path, when it is known and the method is not
+    int route = -1;                   // -1: none
+    std::vector<std::string> values;  // of the pattern's parameters, in order
+    std::vector<std::string>
+        allowed;  // methods of the path, when it is known and the method is not
   };
   // HEAD takes GET's route where it has none of its own.
   Match match(std::string_view method, const std::vector<std::string>& segments) const;

@@ -41,8 +41,9 @@ int64_t integer_parameter(const HttpHead& head, const char* name, int64_t fallba
   const char* end = text->data() + text->size();
   const auto result = std::from_chars(text->data(), end, value);
   if (result.ec != std::errc() || result.ptr != end || value < least || value > most)
-    throw HttpRefusal{400, "The query parameter '" + std::string(name) + "' must be an integer from " +
-                     std::to_string(least) + " to " + std::to_string(most) + "."};
+    throw HttpRefusal{400, "The query parameter '" + std::string(name) +
+                               "' must be an integer from " + std::to_string(least) + " to " +
+                               std::to_string(most) + "."};
   return value;
 }
 

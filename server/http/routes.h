@@ -76,7 +76,8 @@ std::vector<Route> blob_routes();
 std::vector<Route> service_routes();
 std::vector<Route> all_routes();
 
-// --- small things that handlers share -------------------------------------------------------------
+// --- small things that handlers share
+// -------------------------------------------------------------
 
 HttpReply json_reply(std::string json, int status = 200);
 // With an entity tag; 304 when the client has it already.

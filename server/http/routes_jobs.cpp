@@ -16,7 +16,8 @@ constexpr uint64_t kUntilTerminal = UINT64_MAX;
 
 std::string show(Store& store, const JobRecord& job) {
   const bool made = job.state == JobState::succeeded;
-  return write_job(job_message(job, made ? store.artifacts(job.id) : std::vector<ArtifactRecord>()));
+  return write_job(
+      job_message(job, made ? store.artifacts(job.id) : std::vector<ArtifactRecord>()));
 }
 
 // One fault for every input that was not uploaded, where the spec names it.
@@ -31,8 +32,7 @@ std::vector<SpecFault> missing_inputs(Store& store, const Spec& spec) {
     check(input->blob, input->resources.empty() ? pointer : pointer + "/blob");
     for (const auto& [uri, digest] : input->resources) {
       std::string escaped;  // RFC 6901, section 3
-      for (const char c : uri)
-        escaped += c == '~' ? "~0" : c == '/' ? "~1" : std::string(1, c);
+      for (const char c : uri) escaped += c == '~' ? "~0" : c == '/' ? "~1" : std::string(1, c);
       check(digest, pointer + "/resources/" + escaped);
     }
   };

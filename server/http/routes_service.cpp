@@ -35,7 +35,9 @@ HttpReply page_headers(HttpReply reply) {
       .set("Cross-Origin-Resource-Policy", "same-origin");
 }
 
-HttpReply live(RouteContext&, RouteCall&) { return text_reply("ok\n"); }
+HttpReply live(RouteContext&, RouteCall&) {
+  return text_reply("ok\n");
+}
 
 HttpReply ready(RouteContext& context, RouteCall& call) {
   const StoreHealth health = context.store.health();
@@ -55,8 +57,12 @@ HttpReply ready(RouteContext& context, RouteCall& call) {
   return text_reply(lines);
 }
 
-HttpReply version(RouteContext&, RouteCall&) { return json_reply(write_version({})); }
-HttpReply kinds(RouteContext&, RouteCall&) { return json_reply(write_kinds()); }
+HttpReply version(RouteContext&, RouteCall&) {
+  return json_reply(write_version({}));
+}
+HttpReply kinds(RouteContext&, RouteCall&) {
+  return json_reply(write_kinds());
+}
 
 uint64_t resident_bytes() {
   uint64_t pages = 0;
@@ -118,18 +124,29 @@ HttpReply file_at(RouteCall& call, const std::string& path) {
   return asset_reply(call.request.head, *asset);
 }
 
-HttpReply openapi(RouteContext&, RouteCall& call) { return file_at(call, "/openapi.json"); }
-HttpReply front_page(RouteContext&, RouteCall& call) { return file_at(call, "/index.html"); }
-HttpReply page_file(RouteContext&, RouteCall& call) { return file_at(call, '/' + call.values[0]); }
+HttpReply openapi(RouteContext&, RouteCall& call) {
+  return file_at(call, "/openapi.json");
+}
+HttpReply front_page(RouteContext&, RouteCall& call) {
+  return file_at(call, "/index.html");
+}
+HttpReply page_file(RouteContext&, RouteCall& call) {
+  return file_at(call, '/' + call.values[0]);
+}
 
 std::string escape_html(std::string_view text) {
   std::string result;
   for (const char c : text) {
-    if (c == '<') result += "&lt;";
-    else if (c == '>') result += "&gt;";
-    else if (c == '&') result += "&amp;";
-    else if (c == '"') result += "&quot;";
-    else result += c;
+    if (c == '<')
+      result += "&lt;";
+    else if (c == '>')
+      result += "&gt;";
+    else if (c == '&')
+      result += "&amp;";
+    else if (c == '"')
+      result += "&quot;";
+    else
+      result += c;
   }
   return result;
 }
@@ -138,14 +155,14 @@ HttpReply explain_problem(RouteContext&, RouteCall& call) {
   const ProblemKind* kind = find_problem_kind(call.values[0]);
   if (!kind) throw Error(ErrorCode::not_found, "There is no problem of this name.");
   const std::string title = escape_html(kind->title);
-  const char* again = kind->retryable ? "The same request may succeed later."
-                                      : "The same request will fail again.";
-  return page_headers(text_reply(
-      "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>" + title +
-          "</title>\n<h1>" + title + "</h1>\n<p>Code <code>" + escape_html(kind->code) +
-          "</code>, HTTP status " + std::to_string(kind->status) + ".</p>\n<p>" +
-          escape_html(kind->meaning) + "</p>\n<p>" + again + "</p>\n</html>\n",
-      "text/html; charset=utf-8"));
+  const char* again =
+      kind->retryable ? "The same request may succeed later." : "The same request will fail again.";
+  return page_headers(
+      text_reply("<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>" + title +
+                     "</title>\n<h1>" + title + "</h1>\n<p>Code <code>" + escape_html(kind->code) +
+                     "</code>, HTTP status " + std::to_string(kind->status) + ".</p>\n<p>" +
+                     escape_html(kind->meaning) + "</p>\n<p>" + again + "</p>\n</html>\n",
+                 "text/html; charset=utf-8"));
 }
 
 }  // namespace
@@ -159,8 +176,8 @@ const Asset* find_asset(std::span<const Asset> all, const char* path) {
 // Methods are named one by one: a client may send any token, and each would become a series.
 void RequestCounts::count(const std::string& method, int status, double seconds) {
   static constexpr std::string_view kMethods[] = {"GET", "HEAD", "POST", "PUT", "DELETE"};
-  const bool known = std::find(std::begin(kMethods), std::end(kMethods), method) !=
-                     std::end(kMethods);
+  const bool known =
+      std::find(std::begin(kMethods), std::end(kMethods), method) != std::end(kMethods);
   std::lock_guard lock(mutex_);
   ++requests_[{known ? method : "other", status}];
   seconds_ += seconds;

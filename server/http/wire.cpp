@@ -123,7 +123,9 @@ struct Wire::Library : httplib::Server {
 Wire::Wire(int keep_alive_s, int keep_alive_requests)
     : library_(std::make_unique<Library>(keep_alive_s, keep_alive_requests)) {}
 
-Wire::~Wire() { close_socket(); }
+Wire::~Wire() {
+  close_socket();
+}
 
 int Wire::listen(const std::string& host, int port, int backlog) {
   const int bound = port == 0 ? library_->bind_to_any_port(host)
@@ -136,15 +138,19 @@ int Wire::listen(const std::string& host, int port, int backlog) {
   return bound;
 }
 
-int Wire::socket() const { return library_->listening(); }
-void Wire::close_socket() { library_->forget(); }
+int Wire::socket() const {
+  return library_->listening();
+}
+void Wire::close_socket() {
+  library_->forget();
+}
 
 std::string Wire::render(const HttpHead& head, const HttpReply& reply, bool close) const {
   const bool empty = reply.status == 204 || reply.status == 304;
   const bool head_only = empty || reply.file || head.method == "HEAD";
   reply_in_hand = &reply;
-  std::string text = library_->render(
-      head_only ? "HEAD / HTTP/1.1\r\n\r\n" : "GET / HTTP/1.1\r\n\r\n", close);
+  std::string text =
+      library_->render(head_only ? "HEAD / HTTP/1.1\r\n\r\n" : "GET / HTTP/1.1\r\n\r\n", close);
   reply_in_hand = nullptr;
   if (empty) {
     // RFC 9110, section 8.6: no Content-Length with 204, and none but the true one with 304. The

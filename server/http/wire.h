@@ -1,6 +1,7 @@
 #pragma once
 
-// The only user of cpp-httplib's server: it opens the listening socket and turns replies into bytes.
+// The only user of cpp-httplib's server: it opens the listening socket and turns replies into
+// bytes.
 
 #include <memory>
 #include <string>
