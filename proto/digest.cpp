@@ -1,6 +1,8 @@
 #include "proto/digest.h"
 
+#include <fstream>
 #include <string_view>
+#include <vector>
 
 #include <openssl/evp.h>
 
@@ -48,6 +50,24 @@ std::string sha256_digest(const void* data, size_t size) {
   Sha256 hash;
   hash.append(data, size);
   return hash.digest();
+}
+
+FileDigest sha256_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file || std::filesystem::is_directory(path))
+    throw Error(ErrorCode::not_found, "The file " + path.string() + " cannot be read.");
+  Sha256 hash;
+  FileDigest result;
+  std::vector<char> buffer(1 << 20);
+  while (file) {
+    file.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+    hash.append(buffer.data(), static_cast<size_t>(file.gcount()));
+    result.bytes += static_cast<uint64_t>(file.gcount());
+  }
+  if (file.bad())
+    throw Error(ErrorCode::not_found, "The file " + path.string() + " cannot be read to its end.");
+  result.digest = hash.digest();
+  return result;
 }
 
 bool is_digest(std::string_view text) {

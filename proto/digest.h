@@ -3,6 +3,8 @@
 // SHA-256 of bytes that arrive piece by piece.
 
 #include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -23,5 +25,12 @@ class Sha256 {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+struct FileDigest {
+  std::string digest;
+  uint64_t bytes = 0;
+};
+// Throws Error{not_found} when the file cannot be read.
+FileDigest sha256_file(const std::filesystem::path& path);
 
 }  // namespace lightkiln

@@ -169,6 +169,8 @@ std::string write_kinds();
 std::string format_time(int64_t unix_ms);
 // Throws Error{invalid_input} when the text is no such time.
 int64_t parse_time(std::string_view text);
+// Percent-encodes all but the unreserved characters of RFC 3986.
+std::string percent_encode(std::string_view text);
 std::string job_href(const std::string& id);
 std::string artifact_href(const std::string& id, const std::string& name);
 // RFC 9530: "sha-256=:<base64>:" from "sha256:<hex>".

@@ -20,21 +20,6 @@ int digits_at(std::string_view text, size_t begin, size_t size) {
   return number;
 }
 
-std::string percent_encode(std::string_view text) {
-  static constexpr char kHex[] = "0123456789ABCDEF";
-  std::string out;
-  for (const char c : text) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                       c == '-' || c == '.' || c == '_' || c == '~';
-    const auto byte = static_cast<unsigned char>(c);
-    if (plain)
-      out += c;
-    else
-      out += {'%', kHex[byte >> 4], kHex[byte & 15]};
-  }
-  return out;
-}
-
 }  // namespace
 
 std::string format_time(int64_t unix_ms) {
@@ -68,6 +53,21 @@ int64_t parse_time(std::string_view text) {
       hours(digits_at(text, 11, 2)) + minutes(digits_at(text, 14, 2)) +
       seconds(digits_at(text, 17, 2)) + milliseconds(digits_at(text, 20, 3));
   return (sys_days(date).time_since_epoch() + since_midnight).count();
+}
+
+std::string percent_encode(std::string_view text) {
+  static constexpr char kHex[] = "0123456789ABCDEF";
+  std::string out;
+  for (const char c : text) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '-' || c == '.' || c == '_' || c == '~';
+    const auto byte = static_cast<unsigned char>(c);
+    if (plain)
+      out += c;
+    else
+      out += {'%', kHex[byte >> 4], kHex[byte & 15]};
+  }
+  return out;
 }
 
 std::string job_href(const std::string& id) {
