@@ -130,6 +130,13 @@ JsonValue read_json(std::string_view text, const JsonLimits& limits,
     faults->push_back({"", "syntax", "This is not JSON: it starts with a byte-order mark."});
     return JsonValue();
   }
+  // The tokeniser takes a NUL for the end of the input and would not see what follows.
+  const size_t nul = text.find('\0');
+  if (nul != std::string_view::npos) {
+    faults->push_back(
+        {"", "syntax", "This is not JSON: byte " + std::to_string(nul) + " is a NUL."});
+    return JsonValue();
+  }
   Builder builder(limits.max_depth);
   if (nlohmann::json::sax_parse(text.begin(), text.end(), &builder)) return builder.take();
   faults->push_back(builder.fault());

@@ -82,9 +82,10 @@ TEST(Json, RefusesDepthBeyondTheLimitWithoutRecursion) {
 }
 
 TEST(Json, RefusesBytesBeyondTheLimit) {
-  const std::string text = "\"" + std::string(1 << 20, 'a') + "\"";
-  EXPECT_EQ(fault_code(text), "too_large");
-  EXPECT_EQ(fault_code("\"" + std::string((1 << 20) - 2, 'a') + "\""), "");
+  std::string text(1 << 20, 'a');
+  text.front() = text.back() = '"';
+  EXPECT_EQ(fault_code(text), "");
+  EXPECT_EQ(fault_code(text + " "), "too_large");
 }
 
 TEST(Json, RefusesAKeyThatStandsTwiceAndNamesIt) {
@@ -133,7 +134,7 @@ TEST(Json, ConvertsNumbersToIntegersOnlyWhereTheyAreIntegersThatFit) {
 }
 
 TEST(Json, WritesNumbersThatReadBackToTheSameBits) {
-  rc::check([](uint64_t bits) {
+  EXPECT_TRUE(rc::check([](uint64_t bits) {
     const double number = std::bit_cast<double>(bits);
     RC_PRE(std::isfinite(number));
     const std::string text = json_number(number);
@@ -141,7 +142,7 @@ TEST(Json, WritesNumbersThatReadBackToTheSameBits) {
     const JsonValue value = read_json(text, JsonLimits{}, &faults);
     RC_ASSERT(faults.empty());
     RC_ASSERT(std::bit_cast<uint64_t>(value.number()) == bits);
-  });
+  }));
   for (const double number : {0.0, -0.0, 0.1, 1500.0, 1e22, 1e20, 9007199254740993.0, 5e-324,
                               1.7976931348623157e308, 1152921504606846976.0})
     EXPECT_EQ(std::bit_cast<uint64_t>(read_good(json_number(number)).number()),
@@ -168,7 +169,8 @@ TEST(Json, NeverWritesANumberThatIsNotFinite) {
 TEST(Json, WritesAnyBytesAsValidText) {
   EXPECT_EQ(json_string("a\"\\\n\x01\x7f"), "\"a\\\"\\\\\\n\\u0001\\u007f\"");
   EXPECT_EQ(json_string("\xff\xc3"), "\"\xEF\xBF\xBD\xEF\xBF\xBD\"");
-  rc::check([](const std::string& bytes) { RC_ASSERT(fault_code(json_string(bytes)).empty()); });
+  EXPECT_TRUE(rc::check(
+      [](const std::string& bytes) { RC_ASSERT(fault_code(json_string(bytes)).empty()); }));
   // Text that is UTF-8 already comes back as it was.
   for (const std::string text :
        {"gr\xC3\xBC\xC3\x9F", "\xF0\x9F\x94\xA5", "\xE2\x82\xAC", "\xEF\xBF\xBF"})
@@ -191,7 +193,7 @@ TEST(Faults, NameTheNearestKnownKey) {
 
 TEST(Faults, AreCountedBeyondAHundred) {
   FaultList faults;
-  for (int i = 0; i < 250; ++i) faults.add({"/" + std::to_string(i), "type", "wrong"});
+  for (int i = 0; i < 250; ++i) faults.add({std::to_string(i), "type", "wrong"});
   const std::vector<SpecFault> told = faults.take();
   ASSERT_EQ(told.size(), 101u);
   EXPECT_NE(told.back().message.find("150"), std::string::npos);

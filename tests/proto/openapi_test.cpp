@@ -9,6 +9,7 @@
 #include "proto/json_value.h"
 #include "proto/json_writer.h"
 #include "proto/messages.h"
+#include "proto/problem.h"
 #include "proto/spec_table.h"
 #include "tests/support/data.h"
 
@@ -84,10 +85,9 @@ void expect_same(const JsonValue& row, const JsonValue* property) {
     return;
   }
   EXPECT_EQ(text(property->find("default")), text(row.find("default")));
-  if (*row.find("nullable")->boolean())
-    EXPECT_EQ(text(property->find("type")), "[\"" + type + "\",\"null\"]");
-  else
-    EXPECT_EQ(text(property->find("type")), "\"" + type + "\"");
+  const bool nullable = *row.find("nullable")->boolean();
+  EXPECT_EQ(text(property->find("type")),
+            nullable ? "[\"" + type + "\",\"null\"]" : "\"" + type + "\"");
   EXPECT_EQ(text(property->find("enum")), text(row.find("values")));
   EXPECT_EQ(text(property->find("exclusiveMinimum")), text(row.find("exclusive_minimum")));
   if (row.find("maximum") && row.find("maximum")->number() > 1e19) return;  // 2^64 - 1 as a double
@@ -148,8 +148,9 @@ TEST(OpenApi, HasNoParameterWithoutARow) {
 void expect_described(const JsonValue& value, const std::string& path) {
   if (const JsonValue* properties = value.find("properties")) {
     if (const JsonValue::Object* members = properties->object())
-      for (const JsonMember& member : *members)
+      for (const JsonMember& member : *members) {
         EXPECT_NE(member.value.find("description"), nullptr) << path << "/" << member.key;
+      }
   }
   if (const JsonValue::Object* members = value.object())
     for (const JsonMember& member : *members)
@@ -209,8 +210,9 @@ void expect_fits(const JsonValue& value, const JsonValue* shape, const std::stri
     return expect_fits(value, &one->array()->at(index), path);
   }
   if (const JsonValue* required = shape->find("required"))
-    for (const JsonValue& name : *required->array())
+    for (const JsonValue& name : *required->array()) {
       EXPECT_NE(value.find(*name.string()), nullptr) << path << " lacks " << *name.string();
+    }
   if (const JsonValue* names = shape->find("enum")) {
     ASSERT_NE(value.string(), nullptr) << path;
     EXPECT_TRUE(lists(names, *value.string())) << path << " is " << *value.string();
@@ -221,25 +223,35 @@ void expect_fits(const JsonValue& value, const JsonValue* shape, const std::stri
     EXPECT_TRUE(nullable) << path;
     return;
   }
-  if (type.find("\"string\"") != std::string::npos) EXPECT_NE(value.string(), nullptr) << path;
-  if (type == "\"array\"") EXPECT_NE(value.array(), nullptr) << path;
-  if (type == "\"object\"") EXPECT_NE(value.object(), nullptr) << path;
-  if (type == "\"boolean\"") EXPECT_NE(value.boolean(), nullptr) << path;
+  if (type == "\"string\"" || type == "[\"string\",\"null\"]") {
+    EXPECT_NE(value.string(), nullptr) << path;
+  }
+  if (type == "\"array\"") {
+    EXPECT_NE(value.array(), nullptr) << path;
+  }
+  if (type == "\"object\"") {
+    EXPECT_NE(value.object(), nullptr) << path;
+  }
+  if (type == "\"boolean\"") {
+    EXPECT_NE(value.boolean(), nullptr) << path;
+  }
   uint64_t count = 0;
   int64_t number = 0;
-  if (type == "\"integer\"")
+  if (type == "\"integer\"") {
     EXPECT_TRUE(value.to_unsigned(&count) || value.to_signed(&number)) << path;
+  }
   if (const JsonValue* items = shape->find("items"))
     for (const JsonValue& item : *value.array()) expect_fits(item, items, path + "/*");
   const JsonValue* properties = shape->find("properties");
   if (!properties || !value.object()) return;
   for (const JsonMember& member : *value.object()) {
     const JsonValue* property = properties->find(member.key);
-    if (property)
+    if (property) {
       expect_fits(member.value, property, path + "/" + member.key);
-    else
+    } else {
       EXPECT_NE(shape->find("additionalProperties"), nullptr)
           << path << "/" << member.key << " is not described";
+    }
   }
 }
 
