@@ -78,6 +78,9 @@ struct OpennessKernel::Impl {
   Impl(const Tracer& tracer_, const OpennessParameters& p);
 
   Look look_from(const OpennessElement& element) const;
+  // Calls each(packet) for the rays of one block of points, cell by cell.
+  template <typename Each>
+  void each_packet(const Look& look, int level, const Each& each) const;
   void run_level(const Look& look, Sums& sums, RayCounters& counters) const;
   void trace(const RayPacket16& packet, Sums& sums, RayCounters& counters) const;
   OpennessEstimate judge(const Sums& sums) const;
@@ -175,9 +178,9 @@ void OpennessKernel::Impl::trace(const RayPacket16& packet, Sums& sums,
             : std::min(1.0, falloff_weight(parameters, static_cast<double>(t_hit[i])));
 }
 
-void OpennessKernel::Impl::run_level(const Look& look, Sums& sums, RayCounters& counters) const {
-  const HemispherePoints::Block& block = points.block(sums.level);
-  const uint64_t rejected_before = counters.rejected_rays;
+template <typename Each>
+void OpennessKernel::Impl::each_packet(const Look& look, int level, const Each& each) const {
+  const HemispherePoints::Block& block = points.block(level);
   RayPacket16 packet;
   const Vec3& origin = look.facets[0].origin;
   for (size_t i = 0; i < kPacketLanes; ++i) {
@@ -193,9 +196,14 @@ void OpennessKernel::Impl::run_level(const Look& look, Sums& sums, RayCounters& 
   for (uint32_t c = 0; c < block.cells; ++c) {
     block.read(c, look.masks, shifts, &cell);
     aim(look, cell, parameters.distribution, packet);
-    trace(packet, sums, counters);
+    each(packet);
   }
-  sums.points += block.cells;
+}
+
+void OpennessKernel::Impl::run_level(const Look& look, Sums& sums, RayCounters& counters) const {
+  const uint64_t rejected_before = counters.rejected_rays;
+  each_packet(look, sums.level, [&](const RayPacket16& packet) { trace(packet, sums, counters); });
+  sums.points += points.block(sums.level).cells;
   ++sums.level;
   sums.rejected |= counters.rejected_rays != rejected_before;
 }
@@ -224,6 +232,13 @@ OpennessEstimate OpennessKernel::Impl::judge(const Sums& sums) const {
 OpennessKernel::OpennessKernel(const Tracer& tracer, const OpennessParameters& parameters)
     : impl_(std::make_unique<Impl>(tracer, parameters)) {}
 OpennessKernel::~OpennessKernel() = default;
+
+std::vector<RayPacket16> OpennessKernel::packets(const OpennessElement& element, int level) const {
+  std::vector<RayPacket16> all;
+  impl_->each_packet(impl_->look_from(element), level,
+                     [&](const RayPacket16& packet) { all.push_back(packet); });
+  return all;
+}
 
 double OpennessKernel::reach() const {
   return reach_of(impl_->parameters);

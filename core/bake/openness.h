@@ -68,6 +68,9 @@ class OpennessKernel {
                 ChunkReport* report, const Progress& progress,
                 std::vector<std::vector<double>>* history = nullptr) const;
 
+  // The packets that estimate() traces for an element's `level`-th block of points, one a cell.
+  std::vector<RayPacket16> packets(const OpennessElement& element, int level) const;
+
   // The distance past which no hit can change the result, in scene units.
   double reach() const;
   // Student's quantile for the k-th look (k = 1, 2, ...) of the stopping rule.

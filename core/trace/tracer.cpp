@@ -263,7 +263,9 @@ bool Tracer::Impl::prepare(const Ray& ray, RTCRay* out, RayCounters& counters) c
   return true;
 }
 
-// The same gate, sixteen lanes at once. Returns the number of rays left to trace.
+// The same gate, sixteen lanes at once. Returns the number of rays left to trace. Lanes that are
+// not traced are filled with zeros: on instruction sets without native packets of sixteen,
+// Embree 3.13 asserts on their contents although their valid flag is off.
 uint32_t Tracer::Impl::prepare16(const RayPacket16& p, RTCRay16* out, int32_t valid[16],
                                  RayCounters& counters) const {
   int32_t wanted = 0;
@@ -281,25 +283,33 @@ uint32_t Tracer::Impl::prepare16(const RayPacket16& p, RTCRay16* out, int32_t va
   }
   counters.rejected_rays += static_cast<uint64_t>(wanted - kept);
   for (int i = 0; i < 16; ++i) {
-    const float x = p.origin_x[i] - centre.x;
-    const float y = p.origin_y[i] - centre.y;
-    const float z = p.origin_z[i] - centre.z;
-    const float dx = p.direction_x[i];
-    const float dy = p.direction_y[i];
-    const float dz = p.direction_z[i];
-    const float limit = reach_limit(x * x + y * y + z * z, dx * dx + dy * dy + dz * dz, radius);
-    out->tfar[i] = limit < p.t_far[i] ? limit : p.t_far[i];
     out->org_x[i] = p.origin_x[i];
     out->org_y[i] = p.origin_y[i];
     out->org_z[i] = p.origin_z[i];
-    out->dir_x[i] = dx;
-    out->dir_y[i] = dy;
-    out->dir_z[i] = dz;
+    out->dir_x[i] = p.direction_x[i];
+    out->dir_y[i] = p.direction_y[i];
+    out->dir_z[i] = p.direction_z[i];
     out->tnear[i] = p.t_near[i];
+    out->tfar[i] = p.t_far[i];
     out->time[i] = 0;
     out->mask[i] = 0xffffffffu;
     out->id[i] = 0;
     out->flags[i] = 0;
+  }
+  if (kept < 16)
+    for (int i = 0; i < 16; ++i)
+      if (valid[i] == 0)
+        out->org_x[i] = out->org_y[i] = out->org_z[i] = out->dir_x[i] = out->dir_y[i] =
+            out->dir_z[i] = out->tnear[i] = out->tfar[i] = 0;
+  for (int i = 0; i < 16; ++i) {
+    const float x = out->org_x[i] - centre.x;
+    const float y = out->org_y[i] - centre.y;
+    const float z = out->org_z[i] - centre.z;
+    const float dx = out->dir_x[i];
+    const float dy = out->dir_y[i];
+    const float dz = out->dir_z[i];
+    const float limit = reach_limit(x * x + y * y + z * z, dx * dx + dy * dy + dz * dz, radius);
+    out->tfar[i] = limit < out->tfar[i] ? limit : out->tfar[i];
   }
   return static_cast<uint32_t>(kept);
 }

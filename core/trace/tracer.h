@@ -24,7 +24,9 @@ struct TracerOptions {
 
 struct Ray {
   Vec3 origin;
-  Vec3 direction;  // need not be unit; distances are in units of its length
+  // Need not be unit; distances are in units of its length. Components below 1e-18 count as zero,
+  // so that a direction of nothing else misses.
+  Vec3 direction;
   float t_near = 0;
   float t_far = INFINITY;
 };
