@@ -84,6 +84,19 @@ void check_png(std::span<const std::byte> bytes) {
   }
 }
 
+// Huffman tables of a DHT segment: class and number, 16 counts of codes by length, a value per
+// code. No table has more than 256 codes; the decoder writes past its arrays when one claims to.
+void check_huffman_tables(std::span<const std::byte> segment) {
+  while (!segment.empty()) {
+    size_t codes = 0;
+    for (size_t i = 1; i <= 16 && i < segment.size(); ++i)
+      codes += std::to_integer<size_t>(segment[i]);
+    if (codes > 256 || segment.size() < 17 + codes)
+      malformed("JPEG", "one of its Huffman tables is damaged");
+    segment = segment.subspan(17 + codes);
+  }
+}
+
 // The decoder fills what is missing at the end with grey. A complete file has an end marker outside
 // its segments: walk the segments, and in coded data skip stuffed bytes and restart markers.
 void check_jpeg(std::span<const std::byte> bytes) {
@@ -98,14 +111,19 @@ void check_jpeg(std::span<const std::byte> bytes) {
       ++at;
       continue;
     }
-    const bool standalone = marker == 0x00 || marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8);
+    at += 2;
     if (marker == 0xd9) {
       if (!coded) malformed("JPEG", "it holds no image data");
       return;
     }
+    const bool standalone = marker == 0x00 || marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8);
+    if (standalone) continue;
+    const size_t length = byte(at) * 256 + byte(at + 1);
+    if (length < 2) malformed("JPEG", "one of its segments has no length");
+    byte(at + length - 1);
+    if (marker == 0xc4) check_huffman_tables(bytes.subspan(at + 2, length - 2));
     if (marker == 0xda) coded = true;
-    at += 2;
-    if (!standalone) at += byte(at) * 256 + byte(at + 1);
+    at += length;
   }
 }
 

@@ -1,5 +1,6 @@
 #include "core/image/ldr.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -142,6 +143,19 @@ TEST(Jpeg, RefusesEveryTruncation) {
   auto longer = bytes;  // what follows the end marker belongs to nobody
   longer.resize(longer.size() + 100);
   EXPECT_EQ(read_ldr(longer).pixels, read_ldr(bytes).pixels);
+}
+
+// The decoder alone writes past the end of its tables.
+TEST(Jpeg, RefusesHuffmanTablesOfTooManyCodes) {
+  const auto bytes = make_jpeg(pattern8(24, 24, 3));
+  const std::byte marker[] = {std::byte{0xff}, std::byte{0xc4}};
+  auto at = std::search(bytes.begin(), bytes.end(), marker, marker + 2);
+  ASSERT_NE(at, bytes.end());
+  for (std::ptrdiff_t count = 5; count < 21; ++count) {
+    auto damaged = bytes;
+    damaged[static_cast<size_t>(at - bytes.begin() + count)] = std::byte{0xff};
+    EXPECT_REFUSED(read_ldr(damaged), invalid_input, "Huffman");
+  }
 }
 
 TEST(Ldr, RefusesOtherFormats) {
