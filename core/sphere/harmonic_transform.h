@@ -64,7 +64,7 @@ class RingGrid {
   // Lagrange interpolation of degree kTaps - 1 in both angles at a unit direction.
   Vec3d interpolate(const Vec3d& direction) const;
   // The largest error of interpolating a harmonic of band l and unit amplitude.
-  double interpolation_error(int l) const;
+  static double interpolation_error(int l, int rings, int longitudes);
 
  private:
   int rings_, longitudes_;

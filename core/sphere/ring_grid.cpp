@@ -104,8 +104,8 @@ Vec3d RingGrid::interpolate(const Vec3d& direction) const {
   return {sum[0], sum[1], sum[2]};
 }
 
-double RingGrid::interpolation_error(int l) const {
-  return lagrange_phase_error(l * kPi / rings_) + lagrange_phase_error(l * 2 * kPi / longitudes_);
+double RingGrid::interpolation_error(int l, int rings, int longitudes) {
+  return lagrange_phase_error(l * kPi / rings) + lagrange_phase_error(l * 2 * kPi / longitudes);
 }
 
 namespace {

@@ -63,7 +63,8 @@ Vec3d prefilter(const Image& latlong, double alpha, const Vec3d& axis) {
       const double angle = std::acos(std::clamp(dot(centre, axis), -1.0, 1.0));
       const bool horizon = std::abs(angle - kPi / 2) < texel;
       const double width = std::max(alpha, angle);
-      const int cuts = horizon ? 4 : std::clamp(static_cast<int>(8 * texel / width), 1, 24);
+      const int cuts =
+          horizon ? 4 : std::clamp(static_cast<int>(std::ceil(150 * texel / width)), 1, 24);
       const Vec3d radiance = to_double(latlong.rgb(x, y));
       visit_cells(latlong, x, y, cuts, [&](const Vec3d& direction, double omega) {
         const double lobe = ggx_lobe(alpha, dot(direction, axis)) * omega;

@@ -1,0 +1,117 @@
+// Sources: Karis, "Real Shading in Unreal Engine 4", SIGGRAPH 2013 course (split sum); Heitz,
+// "Understanding the Masking-Shadowing Function", JCGT 3(2), 2014 (height-correlated Smith), and
+// "Sampling the GGX Distribution of Visible Normals", JCGT 7(4), 2018 (the stretched hemisphere).
+
+#include "core/environment/dfg.h"
+
+#include <cassert>
+#include <cmath>
+#include <vector>
+
+#include "core/base/parallel.h"
+#include "core/sphere/quadrature.h"
+
+namespace lightkiln {
+
+namespace {
+
+constexpr int kAzimuths = 10;  // on each side of a right angle
+constexpr int kRadii = 20;
+
+struct Azimuth {
+  double cosine, sine, weight;
+};
+struct Radius {
+  double place, weight;  // in (0, 1)
+};
+struct Rule {
+  std::vector<Azimuth> azimuths;  // of (0, pi); weights sum to 1
+  std::vector<Radius> radii;
+};
+
+// Gauss points, gathered quadratically where the integrand bends: at azimuth pi/2 and at the rim.
+Rule make_rule(int azimuths, int radii) {
+  Rule rule;
+  const GaussRule a = gauss_legendre(azimuths), r = gauss_legendre(radii);
+  for (const int side : {-1, 1}) {
+    for (size_t i = 0; i < a.nodes.size(); ++i) {
+      const double s = 0.5 * (1 + a.nodes[i]);
+      const double phi = kPi / 2 * (1 + side * s * s);
+      rule.azimuths.push_back({std::cos(phi), std::sin(phi), 0.5 * s * a.weights[i]});
+    }
+  }
+  for (size_t i = 0; i < r.nodes.size(); ++i) {
+    const double s = 0.5 * (1 - r.nodes[i]);
+    rule.radii.push_back({1 - s * s, s * r.weights[i]});
+  }
+  return rule;
+}
+
+// In the space stretched by 1/alpha, GGX normals are a unit hemisphere: h ~ (a d.x, a d.y, d.z),
+// and those visible from v = (s, 0, c) have the density (w.d) / (pi (1 + w.z) / 2) over the
+// hemisphere of d, w being the unit vector along (a s, 0, c). The reflected share is the mean of
+//   G2 / G1 = (1 + L(v)) / (1 + L(v) + L(l)),  L(x) = (sqrt(a^2 + (1 - a^2) x.z^2) / x.z - 1) / 2,
+// over those d whose reflection l = 2 (v.h) h - v lies above the horizon. In slopes (x, y) = (h.x,
+// h.y) / h.z that is 2 (s x + c) > c (1 + x^2 + y^2), the disc of radius 1/c about (s/c, 0); seen
+// from the origin its rim at azimuth phi is T cos phi + sqrt(T^2 cos^2 phi + 1), T = s/c. Polar
+// coordinates about the origin with k = tan(angle of d / 2) need no trigonometric function:
+//   d = (2k cos phi, 2k sin phi, 1 - k^2) / (1 + k^2),  dw = (2k / (1 + k^2)) (2 dk / (1 + k^2))
+//   dphi.
+DfgValue integrate(double alpha, double cosine, const Rule& rule) {
+  const double a2 = alpha * alpha, sine = std::sqrt((1 - cosine) * (1 + cosine));
+  const double norm = 1 / std::sqrt(a2 * sine * sine + cosine * cosine);
+  const double w_x = alpha * sine * norm, w_z = cosine * norm;
+  const auto smith = [&](double z) { return std::sqrt(a2 + (1 - a2) * z * z); };
+  const double open = 0.5 * (smith(cosine) / cosine + 1);  // 1 + L(v)
+  DfgValue sum;
+  for (const Azimuth& azimuth : rule.azimuths) {
+    const double reach = sine / cosine * azimuth.cosine, root = std::sqrt(reach * reach + 1);
+    const double rim = (reach > 0 ? reach + root : 1 / (root - reach)) / alpha;
+    const double limit = rim / (1 + std::sqrt(1 + rim * rim));
+    for (const Radius& radius : rule.radii) {
+      const double k = limit * radius.place, inverse = 1 / (1 + k * k);
+      const double d_r = 2 * k * inverse, d_z = (1 - k * k) * inverse;
+      const double w_d = w_x * d_r * azimuth.cosine + w_z * d_z;
+      const double h_x = alpha * d_r * azimuth.cosine;
+      const double norm2 = 1 / (a2 * d_r * d_r + d_z * d_z);
+      const double v_h = sine * h_x + cosine * d_z;  // times |h|
+      const double l_z = std::max(0.0, 2 * v_h * d_z * norm2 - cosine);
+      const double visible = l_z * open;
+      const double masking = visible / (visible + 0.5 * (smith(l_z) - l_z));
+      const double measure = 2 * limit * inverse * d_r * radius.weight * azimuth.weight;
+      const double weight = 4 / (1 + w_z) * w_d * measure * masking;
+      const double miss = 1 - v_h * std::sqrt(norm2), miss2 = miss * miss;
+      const double fresnel = miss2 * miss2 * miss;
+      sum.scale += weight * (1 - fresnel);
+      sum.bias += weight * fresnel;
+    }
+  }
+  return sum;
+}
+
+}  // namespace
+
+DfgValue ggx_dfg(double alpha, double cosine, int refinement) {
+  assert(alpha > 0 && alpha <= 1 && cosine > 0 && cosine <= 1 && refinement >= 1);
+  static const Rule rule = make_rule(kAzimuths, kRadii);
+  if (refinement == 1) return integrate(alpha, cosine, rule);
+  return integrate(alpha, cosine, make_rule(refinement * kAzimuths, refinement * kRadii));
+}
+
+Image ggx_dfg_table(int size, int threads, Progress& progress) {
+  Image table(size, size, 3);
+  parallel_blocks(static_cast<size_t>(size), 4, threads, progress, [&](size_t begin, size_t end) {
+    for (size_t row = begin; row < end; ++row) {
+      const double roughness = (static_cast<double>(row) + 0.5) / size;
+      for (int x = 0; x < size; ++x) {
+        const DfgValue value = ggx_dfg(roughness * roughness, (x + 0.5) / size);
+        float* out = table.at(x, static_cast<int>(row));
+        out[0] = static_cast<float>(value.scale);
+        out[1] = static_cast<float>(value.bias);
+      }
+    }
+  });
+  return table;
+}
+
+}  // namespace lightkiln
