@@ -405,10 +405,15 @@ SurfacePoint surface_point(const Scene& scene, const Hit& hit) {
   return point;
 }
 
+// A plane through zero, which recentring makes of every flat scene, has no rounding error along its
+// normal, and one ulp above zero is flushed back to it: a least distance far below any error of the
+// normalised scene, and far above where products underflow, keeps its rays off it.
 Vec3 offset_origin(const SurfacePoint& point, const Vec3& direction) {
+  constexpr float kLeastDistance = 0x1p-60f;
   const Vec3& n = point.normal;
-  const float distance = std::fabs(n.x) * point.error.x + std::fabs(n.y) * point.error.y +
-                         std::fabs(n.z) * point.error.z;
+  const float bound = std::fabs(n.x) * point.error.x + std::fabs(n.y) * point.error.y +
+                      std::fabs(n.z) * point.error.z;
+  const float distance = std::max(bound, kLeastDistance);
   const Vec3 offset = n * (dot(direction, n) < 0 ? -distance : distance);
   Vec3 moved = point.position + offset;
   for (int axis = 0; axis < 3; ++axis) {

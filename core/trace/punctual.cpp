@@ -1,0 +1,70 @@
+#include "core/trace/punctual.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lightkiln {
+
+PunctualLights::PunctualLights(const Scene& scene, const EffectSelection& selection)
+    : metres_per_unit_(1 / scene.normalisation.scale()) {
+  double total = 0;
+  cdf_.push_back(0);
+  for (const PunctualLight& light : scene.lights) {
+    const double brightness = luminance(to_double(light.intensity));
+    if (!selection.punctual[static_cast<int>(light.kind)] || !(brightness > 0)) continue;
+    Light entry{light.kind,
+                scene.normalisation.to_normalised(light.position),
+                light.direction,
+                to_double(light.intensity),
+                light.range,
+                0,
+                0};
+    if (light.kind == LightKind::spot) {
+      const double outer = std::cos(light.outer_cone_rad);
+      entry.cone_scale = 1 / std::max(0.001, std::cos(light.inner_cone_rad) - outer);
+      entry.cone_offset = -outer * entry.cone_scale;
+    }
+    lights_.push_back(entry);
+    total += brightness;
+    cdf_.push_back(total);
+  }
+  if (lights_.empty()) return;
+  for (double& value : cdf_) value /= total;
+  cdf_.back() = 1;
+}
+
+// From the glTF extension KHR_lights_punctual: attenuation = max(min(1 - (d / range)^4, 1), 0) /
+// d^2, and for a spot the square of saturate(cos * scale + offset) with
+// scale = 1 / max(0.001, cos inner - cos outer), offset = -cos outer * scale.
+bool PunctualLights::light_at(size_t index, const Vec3& point, PunctualSample* sample) const {
+  const Light& light = lights_[index];
+  if (light.kind == LightKind::directional) {
+    *sample = {to_float(-light.direction), to_float(light.intensity), true};
+    return true;
+  }
+  const Vec3d to_light = light.position - to_double(point);
+  const double distance = length(to_light) * metres_per_unit_;
+  if (!(distance > 0)) return false;
+  double attenuation = 1 / (distance * distance);
+  if (light.range > 0) {
+    const double ratio = distance / light.range;
+    attenuation *= std::clamp(1 - ratio * ratio * ratio * ratio, 0.0, 1.0);
+  }
+  if (light.kind == LightKind::spot) {
+    const double cosine = -dot(light.direction, to_light) / length(to_light);
+    const double cone = std::clamp(cosine * light.cone_scale + light.cone_offset, 0.0, 1.0);
+    attenuation *= cone * cone;
+  }
+  *sample = {to_float(to_light), to_float(light.intensity * attenuation), false};
+  return attenuation > 0;
+}
+
+size_t PunctualLights::choose(float choice, float* probability) const {
+  const auto above =
+      std::upper_bound(cdf_.begin() + 1, cdf_.end() - 1, static_cast<double>(choice));
+  const auto index = static_cast<size_t>(above - cdf_.begin()) - 1;
+  *probability = static_cast<float>(cdf_[index + 1] - cdf_[index]);
+  return index;
+}
+
+}  // namespace lightkiln

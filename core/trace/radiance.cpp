@@ -1,0 +1,268 @@
+#include "core/trace/radiance.h"
+
+#include <array>
+#include <bit>
+#include <utility>
+
+#include "core/base/random.h"
+
+namespace lightkiln {
+
+namespace {
+
+constexpr float kInversePi = static_cast<float>(1 / kPi);
+
+// A shadow ray ends this share of its length before the emitter, more than the rounding of its
+// parameter at any angle that carries light; scale-free.
+constexpr float kSegment = 1 - 0x1p-13f;
+
+enum class PathDimension : uint64_t { scatter = 0, environment = 1, emissive = 2, punctual = 3 };
+
+uint64_t path_key(uint64_t key, int vertex, PathDimension dimension) {
+  return hash_combine(key, static_cast<uint64_t>(DimensionSet::path_base) +
+                               4 * static_cast<uint64_t>(vertex) +
+                               static_cast<uint64_t>(dimension));
+}
+
+// Power heuristic with exponent 2 for one sample each: p^2 / (p^2 + q^2), written so that densities
+// near the ends of float's range do not overflow.
+float power_heuristic(float p, float q) {
+  if (!(q > 0)) return 1;
+  const float ratio = q / p;  // p = 0: infinite, weight 0
+  return 1 / (1 + ratio * ratio);
+}
+
+// Cosine-weighted: a point (x, y) uniform on the unit disk lifted to z = sqrt(1 - x^2 - y^2) has
+// density cos(theta) / pi per steradian (Malley). Polar mapping.
+Vec3 cosine_hemisphere(float u, float v) {
+  const float r = std::sqrt(u);
+  const float phi = static_cast<float>(2 * kPi) * v;
+  return {r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u)};
+}
+
+struct Vertex {
+  SurfacePoint point;
+  Vec3 normal;  // geometric, towards where the path came from
+};
+
+}  // namespace
+
+bool survives(uint32_t index, int halvings) {
+  const uint32_t first = index < kFirstSamples ? 0 : std::bit_floor(index);
+  const uint32_t length = index < kFirstSamples ? kFirstSamples : first;
+  return index - first < (length >> halvings);
+}
+
+unsigned radiance_mask(const EffectSelection& s) {
+  unsigned mask = 0;
+  if (s.environment) mask |= kEnvironmentBit;
+  if (s.environment && s.environment_sampling) mask |= kEnvironmentSamplingBit;
+  if (s.emissive) mask |= kEmissionBit;
+  if (s.punctual[0] || s.punctual[1] || s.punctual[2]) mask |= kPunctualBit;
+  if (s.textures || s.vertex_colors) mask |= kSurfaceDetailBit;
+  return mask;
+}
+
+template <unsigned kMask>
+struct PathKernel {
+  static constexpr bool kDetail = (kMask & kSurfaceDetailBit) != 0;
+
+  const RadianceScene& scene;
+  uint64_t key;
+  uint32_t index;
+  RayCounters& counters;
+  Vec3 radiance{};
+  Vec3 throughput{1, 1, 1};
+  float scatter_pdf = 0;  // of the ray under way; 0 for the first, which nothing else could sample
+  bool first = true;
+
+  static Vec3 run(const RadianceScene& scene, const Ray& ray, uint64_t key, uint32_t index,
+                  RayCounters& counters) {
+    PathKernel kernel{scene, key, index, counters};
+    kernel.trace(ray);
+    return kernel.radiance;
+  }
+
+  void trace(Ray ray) {
+    const EffectSelection& selection = scene.selection_;
+    for (int vertex = 0;; ++vertex) {
+      first = vertex == 0;
+      first ? ++counters.nearest_rays : ++counters.bounce_rays;
+      const Hit hit = scene.tracer_->nearest(ray, counters);
+      if (!hit.hit()) return add_environment(ray.direction);
+      Vertex here;
+      here.point = surface_point(scene.tracer_->scene(), hit);
+      const bool front = dot(here.point.normal, ray.direction) < 0;
+      here.normal = front ? here.point.normal : -here.point.normal;
+      const SurfaceRecord& record = scene.colors_.record(hit.mesh);
+      if (record.unlit) {
+        if (first) radiance += scene.colors_.base_color<kDetail>(hit, counters);
+        return;
+      }
+      if constexpr ((kMask & kEmissionBit) != 0) {
+        if (record.emits && (front || record.double_sided)) {
+          add_emission(hit, -dot(here.normal, ray.direction));
+        }
+      }
+      if (vertex >= selection.max_bounces) return;
+      throughput = throughput * scene.colors_.base_color<kDetail>(hit, counters);
+      if (spent()) return;
+      add_lights(here, vertex);
+      if (!goes_on(vertex + 1)) return;
+      ray = scatter(here, vertex);
+    }
+  }
+
+  // No light left to carry: black surface, or under the floor that the order's bound allows.
+  bool spent() const {
+    const float largest = std::max(throughput.x, std::max(throughput.y, throughput.z));
+    return largest <= scene.selection_.throughput_floor;
+  }
+
+  // The fixed fractions of samples that visit deep vertices, at weights that make up for them.
+  bool goes_on(int next_vertex) {
+    for (int i = 0; i < 2; ++i) {
+      if (next_vertex != scene.selection_.halving[i]) continue;
+      if (!survives(index, i + 1)) return false;
+      throughput *= 2.0f;
+    }
+    return true;
+  }
+
+  Ray scatter(const Vertex& here, int vertex) {
+    const Point2 u = sobol2(path_key(key, vertex, PathDimension::scatter), index);
+    const Vec3 local = cosine_hemisphere(u.x, u.y);
+    const Vec3 direction = normalize(make_basis(here.normal).to_world(local));
+    scatter_pdf = local.z * kInversePi;
+    return {offset_origin(here.point, direction), direction};
+  }
+
+  void add_environment(const Vec3& direction) {
+    if constexpr ((kMask & kEnvironmentBit) != 0) {
+      if (scene.environment_ == nullptr) return;
+      ++counters.environment_reads;
+      float weight = 1;
+      if constexpr ((kMask & kEnvironmentSamplingBit) != 0) {
+        if (!first && scene.environment_sampler_) {
+          weight = power_heuristic(scatter_pdf, scene.environment_sampler_->pdf(direction));
+        }
+      }
+      radiance += throughput * environment_radiance(*scene.environment_, direction) * weight;
+    }
+  }
+
+  // Density per solid angle of the emitters' sampler: density per area times d^2 / cos.
+  void add_emission(const Hit& hit, float cosine) {
+    float weight = 1;
+    if (!first && !scene.emitters_.empty()) {
+      const float per_area = scene.emitters_.area_density(hit.mesh);
+      weight = power_heuristic(scatter_pdf * cosine, per_area * hit.t * hit.t);
+    }
+    radiance += throughput * scene.colors_.emission<kDetail>(hit, counters) * weight;
+  }
+
+  void add_lights(const Vertex& here, int vertex) {
+    if constexpr ((kMask & kEnvironmentSamplingBit) != 0) {
+      if (scene.environment_sampler_) light_from_environment(here, vertex);
+    }
+    if constexpr ((kMask & kEmissionBit) != 0) {
+      if (!scene.emitters_.empty()) light_from_emitters(here, vertex);
+    }
+    if constexpr ((kMask & kPunctualBit) != 0) light_from_punctual(here, vertex);
+  }
+
+  bool shadowed(const Vec3& origin, const Vec3& direction, float end) {
+    ++counters.shadow_rays;
+    return scene.tracer_->occluded({origin, direction, 0, end}, counters);
+  }
+
+  // rho / pi L cos / p, weighted against the scattered ray's density cos / pi.
+  void light_from_environment(const Vertex& here, int vertex) {
+    const Point2 u = sobol2(path_key(key, vertex, PathDimension::environment), index);
+    const EnvironmentSampler::Sample light = scene.environment_sampler_->sample(u.x, u.y);
+    const float cosine = dot(here.normal, light.direction);
+    if (!(cosine > 0)) return;
+    ++counters.environment_reads;
+    if (shadowed(offset_origin(here.point, light.direction), light.direction, INFINITY)) return;
+    const float scattered = cosine * kInversePi;
+    radiance += throughput * light.radiance *
+                (scattered / light.pdf * power_heuristic(light.pdf, scattered));
+  }
+
+  // rho / pi L cos cos' / (d^2 p_area).
+  void light_from_emitters(const Vertex& here, int vertex) {
+    const Point4 u = sobol4(path_key(key, vertex, PathDimension::emissive), index);
+    const Hit light = scene.emitters_.sample(u.x, u.y, u.z);
+    const SurfacePoint there = surface_point(scene.tracer_->scene(), light);
+    const Vec3 between = there.position - here.point.position;
+    const float distance2 = dot(between, between);
+    if (!(distance2 > 0)) return;
+    const Vec3 direction = between / std::sqrt(distance2);
+    const float cosine = dot(here.normal, direction);
+    const float facing = -dot(there.normal, direction);
+    const bool lit = facing > 0 || (facing < 0 && scene.colors_.record(light.mesh).double_sided);
+    if (!(cosine > 0) || !lit || !scene.colors_.present(light, counters)) return;
+    const Vec3 origin = offset_origin(here.point, direction);
+    if (shadowed(origin, offset_origin(there, -direction) - origin, kSegment)) return;
+    const float light_pdf = scene.emitters_.area_density(light.mesh) * distance2 / std::abs(facing);
+    const float scattered = cosine * kInversePi;
+    radiance += throughput * scene.colors_.emission<kDetail>(light, counters) *
+                (scattered / light_pdf * power_heuristic(light_pdf, scattered));
+  }
+
+  void light_from_punctual(const Vertex& here, int vertex) {
+    const size_t count = scene.punctual_.size();
+    if (count <= PunctualLights::kEveryLight) {
+      for (size_t i = 0; i < count; ++i) light_from_point(here, i, 1);
+      return;
+    }
+    const Point2 u = sobol2(path_key(key, vertex, PathDimension::punctual), index);
+    float probability = 1;
+    const size_t chosen = scene.punctual_.choose(u.x, &probability);
+    if (probability > 0) light_from_point(here, chosen, 1 / probability);
+  }
+
+  // rho / pi E cos.
+  void light_from_point(const Vertex& here, size_t index_of_light, float weight) {
+    PunctualSample light;
+    if (!scene.punctual_.light_at(index_of_light, here.point.position, &light)) return;
+    const float cosine = dot(here.normal, light.to_light) / length(light.to_light);
+    if (!(cosine > 0)) return;
+    const Vec3 origin = offset_origin(here.point, light.to_light);
+    const Vec3 along =
+        light.distant ? light.to_light : here.point.position + light.to_light - origin;
+    if (shadowed(origin, along, light.distant ? INFINITY : 1.0f)) return;
+    radiance += throughput * light.irradiance * (cosine * kInversePi * weight);
+  }
+};
+
+namespace {
+
+using Kernel = Vec3 (*)(const RadianceScene&, const Ray&, uint64_t, uint32_t, RayCounters&);
+
+template <unsigned... kMasks>
+constexpr std::array<Kernel, sizeof...(kMasks)> kernel_table(
+    std::integer_sequence<unsigned, kMasks...>) {
+  return {&PathKernel<kMasks>::run...};
+}
+constexpr auto kKernels =
+    kernel_table(std::make_integer_sequence<unsigned, kAllRadianceBits + 1>{});
+
+}  // namespace
+
+RadianceScene::RadianceScene(const Tracer& tracer, const Environment* environment,
+                             const LightSurvey& survey, const EffectSelection& selection,
+                             unsigned mask)
+    : tracer_(&tracer), selection_(selection), colors_(tracer.scene(), survey, selection) {
+  if (selection.environment) environment_ = environment;
+  if (environment_ != nullptr && selection.environment_sampling) {
+    environment_sampler_ = std::make_unique<EnvironmentSampler>(*environment_);
+  }
+  if (selection.emissive && selection.emissive_sampling) {
+    emitters_ = EmissiveSampler(tracer.scene(), survey);
+  }
+  punctual_ = PunctualLights(tracer.scene(), selection);
+  kernel_ = kKernels[mask != 0 ? mask : radiance_mask(selection)];
+}
+
+}  // namespace lightkiln
