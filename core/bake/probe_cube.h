@@ -1,0 +1,81 @@
+#pragma once
+
+// Radiance over the cube around a probe, sampled in doublings of sixteen independent scramblings.
+//
+// A texel is the mean over its square (box filter in face coordinates). Spherical harmonics are
+// integrated over the very samples, not over texels, so that they do not depend on the cube's size
+// but for noise; a constant gives its exact coefficients. Every number is a pure function of (key,
+// texel, replicate, index).
+
+#include <cstdint>
+#include <vector>
+
+#include "core/bake/accuracy.h"
+#include "core/base/progress.h"
+#include "core/base/statistics.h"
+#include "core/sphere/harmonics.h"
+#include "core/trace/radiance.h"
+
+namespace lightkiln {
+
+// Some texels of a cube with `size` texels a side.
+struct CubeTexels {
+  int size = 0;
+  std::vector<uint32_t> texels;  // (face * size + y) * size + x: the row of the stacked image
+  std::vector<double> shares;    // of the sphere, that each stands for; they sum to 1
+};
+CubeTexels all_texels(int size);
+// One texel, drawn by `seed`, of each cell of a grid of at most `cells` a side over every face.
+CubeTexels sparse_texels(int size, int cells, uint64_t seed);
+
+class CubeSampling {
+ public:
+  // Keeps references. `bands` = 0 leaves the harmonics out; otherwise `texels` are all.
+  CubeSampling(const RadianceScene& scene, const CubeTexels& texels, const Vec3& origin,
+               uint64_t key, int bands, int threads);
+
+  // Brings every texel to kFirstSamples a replicate, then to twice what it has. The result's
+  // errors are left 0. Throws Error{cancelled}.
+  Round advance(Progress& progress, double progress_begin, double progress_end);
+
+  uint64_t samples() const;  // a texel, over all replicates
+  Vec3 texel(size_t i) const;
+  // 95 % half-width of a texel's luminance.
+  double half_width(size_t i) const;
+  double mean_luminance() const;
+  // Root mean square over the sphere of the texels' 95 % half-widths of luminance.
+  double error() const;
+  // True when most of the squared error comes from texels where one sample holds over a tenth of
+  // the sum: such an estimate of variance cannot be trusted.
+  bool suspicious() const;
+  // Radiance, and the largest 95 % half-width of a coefficient's luminance relative to L00's.
+  ShRgb harmonics() const;
+  double harmonics_error() const;
+  const RayCounters& counters() const { return counters_; }
+
+ private:
+  struct Texel {
+    Vec3d sum;
+    double luminance[kReplicates] = {};  // sums
+    double largest = 0;
+  };
+  struct Block {
+    RayCounters counters;
+    std::vector<Vec3d> harmonics;  // [replicate * bands^2 + coefficient]
+  };
+
+  void sample_texel(size_t i, uint32_t from, uint32_t to, Progress& progress, Block* block);
+
+  const RadianceScene& scene_;
+  const CubeTexels& order_;
+  Vec3 origin_;
+  uint64_t key_;
+  int bands_;
+  int threads_;
+  uint32_t taken_ = 0;  // a replicate
+  std::vector<Texel> slots_;
+  std::vector<Vec3d> harmonics_;  // by replicate, means over the samples so far
+  RayCounters counters_;
+};
+
+}  // namespace lightkiln

@@ -1,0 +1,119 @@
+#include "core/bake/probe_pilot.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/bake/probe_cube.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
+
+namespace lightkiln {
+
+namespace {
+
+constexpr uint64_t kPilotProbes = 4;
+constexpr uint64_t kCandidates = 64;
+constexpr uint32_t kReferencePaths = 1024;  // a replicate; rounds of the path sampler end here
+constexpr size_t kPathsPerBlock = 256;
+constexpr int kPilotRounds = 3;
+constexpr double kPilotTexels = 864;  // over all pilot probes
+// Deep enough that the mean albedo leaves a hundredth.
+constexpr double kPilotRest = 0.01;
+
+int pilot_bounces(const LightSurvey& survey) {
+  if (!(survey.mean_albedo > 0)) return survey.max_albedo > 0 ? 2 : 0;
+  const double bounces = std::log(kPilotRest) / std::log(std::min(survey.mean_albedo, 0.99));
+  return static_cast<int>(std::clamp(std::ceil(bounces), 2.0, double{kMostBounces}));
+}
+
+Vec3 uniform_direction(const Point2& u) {
+  const double z = 1 - 2 * static_cast<double>(u.x);
+  const double r = std::sqrt(std::max(0.0, 1 - z * z));
+  const double phi = 2 * kPi * static_cast<double>(u.y);
+  return to_float({r * std::cos(phi), r * std::sin(phi), z});
+}
+
+}  // namespace
+
+std::vector<uint64_t> pilot_probes(const ProbesState& state) {
+  const uint64_t count = state.parameters().positions.size();
+  const uint64_t candidates = std::min(count, kCandidates);
+  std::vector<uint64_t> free, taken;
+  for (uint64_t i = 0; i < candidates; ++i) {
+    const uint64_t probe = count * i / candidates;
+    RayCounters counters;
+    const ProbeSurroundings found = probe_surroundings(*state.tracer, state.origin(probe),
+                                                       state.key(kPilotStream, probe), counters);
+    (found.status == ProbeStatus::valid ? free : taken).push_back(probe);
+  }
+  const std::vector<uint64_t>& from = free.empty() ? taken : free;
+  const uint64_t wanted = std::min<uint64_t>(kPilotProbes, from.size());
+  std::vector<uint64_t> chosen;
+  for (uint64_t i = 0; i < wanted; ++i) chosen.push_back(from[from.size() * i / wanted]);
+  return chosen;
+}
+
+double pilot_luminance(ProbesState& state, const std::vector<uint64_t>& probes,
+                       Progress& progress) {
+  EffectOrder order = state.order(0);
+  if (!order.max_bounces) order.max_bounces = pilot_bounces(state.survey);
+  const RadianceScene& scene = state.radiance_for(decide_effects(state.survey, order).selection);
+  const size_t each = static_cast<size_t>(kReplicates) * kReferencePaths;
+  const size_t count = probes.size() * each;
+  std::vector<double> sums((count + kPathsPerBlock - 1) / kPathsPerBlock);
+  parallel_blocks(
+      count, kPathsPerBlock, state.grants.threads, progress,
+      [&](size_t begin, size_t end) {
+        RayCounters counters;
+        double sum = 0;
+        for (size_t i = begin; i < end; ++i) {
+          const uint64_t probe = probes[i / each];
+          const uint64_t key =
+              hash_combine(state.key(kPilotStream, probe), i % each / kReferencePaths);
+          const auto index = static_cast<uint32_t>(i % kReferencePaths);
+          const Point2 u =
+              sobol2(hash_combine(key, static_cast<uint64_t>(DimensionSet::probe_pilot)), index);
+          sum += luminance(to_double(
+              scene.sample({state.origin(probe), uniform_direction(u)}, key, index, counters)));
+        }
+        sums[begin / kPathsPerBlock] = sum;
+      },
+      0, 0.3);
+  return std::accumulate(sums.begin(), sums.end(), 0.0) / static_cast<double>(count);
+}
+
+std::vector<Round> pilot_rounds(ProbesState& state, const Plan& plan,
+                                const std::vector<uint64_t>& probes, Progress& progress) {
+  const RadianceScene& scene = state.radiance_for(plan_selection(state, plan));
+  const int size = state.parameters().cubemap.size;
+  const int cells = std::max(
+      2, static_cast<int>(std::sqrt(kPilotTexels / (6 * static_cast<double>(probes.size())))));
+  const double all = static_cast<double>(plan.elements) * 6 * size * size;
+  std::vector<Round> rounds(kPilotRounds);
+  double done = 0.3;
+  for (const uint64_t probe : probes) {
+    const uint64_t key = state.key(kPilotStream, probe);
+    const CubeTexels texels = sparse_texels(size, cells, key);
+    CubeSampling sampling(scene, texels, state.origin(probe), hash_combine(key, 1), 0,
+                          state.grants.threads);
+    const double scale = all / static_cast<double>(probes.size() * texels.texels.size());
+    for (Round& total : rounds) {
+      const double next = done + 0.7 / static_cast<double>(probes.size() * kPilotRounds);
+      const Round round = sampling.advance(progress, done, next);
+      done = next;
+      const double error = sampling.error() / plan.reference_luminance;
+      total.samples = round.samples;
+      total.rays += static_cast<uint64_t>(static_cast<double>(round.rays) * scale);
+      total.elements = plan.elements;
+      total.cpu_s += round.cpu_s * scale;
+      total.wall_s += round.wall_s * scale;
+      total.error_sum_sq +=
+          error * error * static_cast<double>(plan.elements) / static_cast<double>(probes.size());
+      total.error_max = std::max(total.error_max, error);
+    }
+  }
+  return rounds;
+}
+
+}  // namespace lightkiln

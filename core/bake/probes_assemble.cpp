@@ -1,0 +1,155 @@
+#include <algorithm>
+#include <cstdio>
+#include <string>
+
+#include "core/bake/probes_state.h"
+#include "core/image/exr.h"
+
+namespace lightkiln {
+
+namespace {
+
+// Half's own rounding, 2^-11 of a value, is left to orders that it cannot spoil.
+constexpr double kHalfIsEnough = 0.002;
+
+std::string artifact_name(uint64_t probe, const char* what) {
+  char name[64];
+  std::snprintf(name, sizeof name, "probe_%04llu_%s.exr", static_cast<unsigned long long>(probe),
+                what);
+  return name;
+}
+
+// The cube's texel centres lie at (i + 1/2)/N, not on the borders as the standard attribute
+// `envmap` says, so the layout is told in words of our own.
+std::map<std::string, std::string> attributes(const Vec3d& position, const char* quantity) {
+  char place[96];
+  std::snprintf(place, sizeof place, "%.17g %.17g %.17g", position.x, position.y, position.z);
+  return {{"lightkiln.layout", "cube: +X -X +Y -Y +Z -Z from top to bottom"},
+          {"lightkiln.position", place},
+          {"lightkiln.quantity", quantity},
+          {"lightkiln.texel_convention", "half_texel"}};
+}
+
+Artifact image_artifact(std::string name, const Image& image, ExrPixelType type,
+                        std::map<std::string, std::string> words) {
+  ExrWriteOptions options;
+  options.pixel_type = type;
+  options.attributes = std::move(words);
+  return {std::move(name), "image", "image/x-exr", write_exr(image, options)};
+}
+
+Image stacked_cube(int size, int channels, std::vector<float> pixels) {
+  Image image;
+  image.width = size;
+  image.height = 6 * size;
+  image.channels = channels;
+  image.pixels = std::move(pixels);
+  return image;
+}
+
+ProbeDocument describe(const ProbeResult& result, const Vec3d& position) {
+  ProbeDocument document;
+  document.index = result.index;
+  document.position = position;
+  document.status = result.surroundings.status;
+  document.backface_share = result.surroundings.backface_share;
+  document.distance_mean = result.surroundings.distance_mean;
+  document.distance_min = result.surroundings.distance_min;
+  document.hit_share = result.surroundings.hit_share;
+  document.error = result.error;
+  document.accuracy = result.accuracy;
+  document.sh.sh = result.sh;
+  document.sh.selftest = make_selftest(result.sh);
+  document.sh.error = result.sh_error;
+  document.radiance_artifact = artifact_name(result.index, "radiance");
+  document.distance_artifact = artifact_name(result.index, "distance");
+  return document;
+}
+
+}  // namespace
+
+void write_probe(const ProbeResult& result, ByteWriter& writer) {
+  writer.u64(result.index);
+  writer.u32(static_cast<uint32_t>(result.surroundings.status));
+  writer.f64(result.surroundings.backface_share);
+  writer.f64(result.surroundings.hit_share);
+  writer.f64(result.surroundings.distance_mean);
+  writer.f64(result.surroundings.distance_min);
+  writer.u32(static_cast<uint32_t>(result.accuracy));
+  writer.u64(result.samples);
+  writer.f64(result.error);
+  writer.f64(result.sh_error);
+  for (const Vec3d& c : result.sh.coefficients) {
+    writer.f64(c.x);
+    writer.f64(c.y);
+    writer.f64(c.z);
+  }
+  writer.floats(result.radiance);
+  writer.floats(result.distance);
+}
+
+ProbeResult read_probe(ByteReader& reader, const ProbesParameters& parameters) {
+  ProbeResult result;
+  result.index = reader.u64();
+  result.surroundings.status = static_cast<ProbeStatus>(reader.u32());
+  result.surroundings.backface_share = reader.f64();
+  result.surroundings.hit_share = reader.f64();
+  result.surroundings.distance_mean = reader.f64();
+  result.surroundings.distance_min = reader.f64();
+  result.accuracy = static_cast<AccuracyStatus>(reader.u32());
+  result.samples = reader.u64();
+  result.error = reader.f64();
+  result.sh_error = reader.f64();
+  result.sh = ShRgb(parameters.sh.bands);
+  for (Vec3d& c : result.sh.coefficients) {
+    c.x = reader.f64();
+    c.y = reader.f64();
+    c.z = reader.f64();
+  }
+  const auto size = static_cast<size_t>(parameters.cubemap.size);
+  result.radiance.resize(6 * size * size * 3);
+  result.distance.resize(6 * size * size);
+  reader.floats(result.radiance);
+  reader.floats(result.distance);
+  return result;
+}
+
+Assembly probes_assemble(ProbesState& state, const Plan& plan, std::span<const ChunkResult> chunks,
+                         Progress& progress) {
+  const ProbesParameters& parameters = state.parameters();
+  const double target = target_error(state.spec);
+  const ExrPixelType type = target < kHalfIsEnough ? ExrPixelType::float32 : ExrPixelType::half;
+  Assembly assembly;
+  ProbesDocument document;
+  document.cubemap_size = parameters.cubemap.size;
+  std::vector<ChunkReport> reports;
+  for (size_t i = 0; i < chunks.size(); ++i) {
+    ByteReader reader(chunks[i].bytes);
+    for (uint64_t p = 0; p < plan.chunks[i].count; ++p) {
+      ProbeResult result = read_probe(reader, parameters);
+      const Vec3d& position = parameters.positions.at(result.index);
+      document.probes.push_back(describe(result, position));
+      const ProbeDocument& described = document.probes.back();
+      assembly.artifacts.push_back(
+          image_artifact(described.radiance_artifact,
+                         stacked_cube(parameters.cubemap.size, 3, std::move(result.radiance)), type,
+                         attributes(position, "radiance")));
+      assembly.artifacts.push_back(image_artifact(
+          described.distance_artifact,
+          stacked_cube(parameters.cubemap.size, 1, std::move(result.distance)),
+          ExrPixelType::float32,
+          attributes(position, "distance to the nearest surface, world units; 0 = nothing hit")));
+      progress.update(static_cast<double>(document.probes.size()) /
+                      static_cast<double>(plan.elements));
+    }
+    reports.push_back(chunks[i].report);
+  }
+  assembly.accuracy =
+      summarise_accuracy(reports, target, plan.predicted_s,
+                         "95 % half-width of texel luminance, root mean square over the sphere, "
+                         "relative to the job's mean luminance");
+  assembly.document = std::move(document);
+  return assembly;
+}
+
+}  // namespace lightkiln
