@@ -226,6 +226,7 @@ class Loader {
     }
     name_mesh(posed.mesh, node, mesh, index);
     posed.mesh.material = material_of(primitive);
+    warn_of_absent_texcoords(posed.mesh, where);
     posed_.push_back(std::move(posed));
   }
 
@@ -237,6 +238,16 @@ class Loader {
     to.node = static_cast<int>(node);
     to.mesh = static_cast<int>(mesh);
     to.primitive = static_cast<int>(primitive);
+  }
+
+  void warn_of_absent_texcoords(const SurfaceMesh& mesh, const std::string& where) {
+    const Material& material = scene_.materials[static_cast<size_t>(mesh.material)];
+    for (const TextureSlot* slot : {&material.base_color_texture, &material.emissive_texture}) {
+      if (slot->texture >= 0 && mesh.texcoords[slot->texcoord].empty()) {
+        warn("The primitive at " + where + " has no TEXCOORD_" + std::to_string(slot->texcoord) +
+             ", which a texture of its material reads.");
+      }
+    }
   }
 
   // The default material (glTF 2.0, section 3.9.7) is added at the end when something needs it.

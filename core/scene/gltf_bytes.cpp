@@ -16,14 +16,20 @@ GltfBytes::GltfBytes(const GltfFile& file, const GltfSource& source)
       buffers_(file.buffers.size()),
       views_(file.views.size()),
       images_(file.images.size()) {
-  const auto check = [](const std::optional<std::string>& uri, const std::string& where) {
-    if (uri && !is_data_uri(*uri)) resource_name(*uri, where);
+  const auto check = [](const std::optional<std::string>& uri,
+                        std::optional<std::vector<std::byte>>& slot, const std::string& where) {
+    if (!uri) return;
+    if (is_data_uri(*uri)) {
+      slot = decode_data_uri(*uri, where);
+    } else {
+      resource_name(*uri, where);
+    }
   };
   for (size_t i = 0; i < file.buffers.size(); ++i) {
-    check(file.buffers[i].uri, place("buffers", i) + "/uri");
+    check(file.buffers[i].uri, buffers_[i], place("buffers", i) + "/uri");
   }
   for (size_t i = 0; i < file.images.size(); ++i) {
-    check(file.images[i].uri, place("images", i) + "/uri");
+    check(file.images[i].uri, images_[i], place("images", i) + "/uri");
   }
 }
 
@@ -38,19 +44,13 @@ std::span<const std::byte> GltfBytes::named(const std::string& uri, const std::s
   return found->second;
 }
 
-std::span<const std::byte> GltfBytes::embedded(std::optional<std::vector<std::byte>>& slot,
-                                               const std::string& uri, const std::string& where) {
-  if (!slot) slot = decode_data_uri(uri, where);
-  return *slot;
-}
-
 std::span<const std::byte> GltfBytes::buffer(size_t index) {
   const GltfBuffer& buffer = file_.buffers[index];
   const std::string where = place("buffers", index);
   std::span<const std::byte> bytes;
   if (buffer.uri) {
-    bytes = is_data_uri(*buffer.uri) ? embedded(buffers_[index], *buffer.uri, where + "/uri")
-                                     : named(*buffer.uri, where + "/uri");
+    bytes = buffers_[index] ? std::span<const std::byte>(*buffers_[index])
+                            : named(*buffer.uri, where + "/uri");
   } else if (index == 0 && file_.container.has_bin && !buffer.fallback) {
     bytes = file_.container.bin;
   } else {
@@ -83,9 +83,8 @@ std::span<const std::byte> GltfBytes::view(size_t index) {
 std::span<const std::byte> GltfBytes::image(size_t index) {
   const GltfImage& image = file_.images[index];
   if (image.view) return view(*image.view);
-  const std::string where = place("images", index) + "/uri";
-  return is_data_uri(*image.uri) ? embedded(images_[index], *image.uri, where)
-                                 : named(*image.uri, where);
+  if (images_[index]) return *images_[index];
+  return named(*image.uri, place("images", index) + "/uri");
 }
 
 }  // namespace lightkiln

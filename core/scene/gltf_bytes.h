@@ -1,7 +1,7 @@
 #pragma once
 
-// The bytes behind buffers, views and images of a checked glTF, fetched when first asked for:
-// from the GLB's chunk, a data URI, a file handed over, or a compressed stream.
+// The bytes behind buffers, views and images of a checked glTF: from the GLB's chunk, a data URI, a
+// file handed over, or a compressed stream. What nothing reads may be absent.
 
 #include <cstddef>
 #include <optional>
@@ -14,7 +14,8 @@ namespace lightkiln {
 
 class GltfBytes {
  public:
-  // Both must outlive this object. Checks every URI's form at once, also of what is never used.
+  // Both must outlive this object. Checks every URI and unpacks every data URI at once, also those
+  // of what is never used.
   GltfBytes(const GltfFile& file, const GltfSource& source);
 
   // At least the buffer's stated length. Throws Error{invalid_input}: a missing or short file, by
@@ -27,11 +28,10 @@ class GltfBytes {
 
  private:
   std::span<const std::byte> named(const std::string& uri, const std::string& where);
-  std::span<const std::byte> embedded(std::optional<std::vector<std::byte>>& slot,
-                                      const std::string& uri, const std::string& where);
 
   const GltfFile& file_;
   const GltfSource& source_;
+  // Unpacked from data URIs (buffers, images) and compressed streams (views).
   std::vector<std::optional<std::vector<std::byte>>> buffers_, views_, images_;
 };
 

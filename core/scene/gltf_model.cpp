@@ -22,6 +22,7 @@
 #pragma GCC diagnostic pop
 
 #include "core/base/error.h"
+#include "core/scene/gltf_formats.h"
 
 namespace lightkiln {
 
@@ -356,6 +357,7 @@ GltfModel read_model(const GltfFile& file) {
   for (const auto& t : from.textures) to.textures.push_back(texture(t, from));
   for (size_t i = 0; i < from.lights.size(); ++i) to.lights.push_back(light(from.lights[i], i));
   to.roots = scene_roots(from, to.warnings);
+  check_formats(file, to);
   return to;
 }
 

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 
-#include "core/base/error.h"
-
 namespace lightkiln {
 
 Affine composed(const Affine& second, const Affine& first) {
@@ -97,13 +95,6 @@ std::vector<Affine> joint_transforms(const GltfModel& model, size_t skin,
   std::vector<Affine> joints;
   for (const size_t joint : from.joints) joints.push_back(world[joint]);
   if (!from.inverse_bind) return joints;
-  const GltfAccessor& accessor = source.file.accessors[*from.inverse_bind];
-  if (accessor.component != ComponentType::f32 || accessor.components() != 16 ||
-      accessor.count < joints.size() || accessor.count > joints.size() + 65536) {
-    throw Error(ErrorCode::invalid_input,
-                "The inverse bind matrices must be 4x4 float matrices, one for each joint.",
-                "/skins/" + std::to_string(skin) + "/inverseBindMatrices");
-  }
   const std::vector<float> values = read_floats(source, *from.inverse_bind);
   for (size_t i = 0; i < joints.size(); ++i) {
     const float* m = &values[i * 16];

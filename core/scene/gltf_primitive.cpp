@@ -1,4 +1,4 @@
-// Source: Khronos, glTF 2.0 Specification, section 3.7.2 (geometry), and KHR_mesh_quantization.
+// Source: Khronos, glTF 2.0 Specification, section 3.7.2 (geometry).
 
 #include "core/scene/gltf_primitive.h"
 
@@ -12,76 +12,19 @@ namespace {
   throw Error(ErrorCode::invalid_input, sentence, where);
 }
 
-// --- Formats -------------------------------------------------------------------------------------
+// --- Attributes
+// --------------------------------------------------------------------------------------
 
-bool uses_quantization(const GltfFile& file) {
-  const JsonValue* used = file.json.find("extensionsUsed");
-  if (!used || !used->array()) return false;
-  for (const JsonValue& name : *used->array()) {
-    const std::string* text = std::get_if<std::string>(&name.data);
-    if (text && *text == "KHR_mesh_quantization") return true;
-  }
-  return false;
-}
-
-bool is_small_integer(ComponentType type) {
-  return type != ComponentType::f32 && type != ComponentType::u32;
-}
-
-// Which formats an attribute may have, as a rule over (accessor, quantised file).
-bool format_allowed(const std::string& name, const GltfAccessor& a, bool quantized) {
-  const bool real = a.component == ComponentType::f32;
-  const bool integer = is_small_integer(a.component);
-  const bool is_unsigned = a.component == ComponentType::u8 || a.component == ComponentType::u16;
-  const bool fraction = real || (is_unsigned && a.normalized);
-  if (a.columns != 1) return false;
-  if (name == "POSITION") return a.rows == 3 && (real || (quantized && integer));
-  if (name == "NORMAL") {
-    return a.rows == 3 && (real || (quantized && integer && !is_unsigned && a.normalized));
-  }
-  if (name.starts_with("TEXCOORD_")) return a.rows == 2 && (fraction || (quantized && integer));
-  if (name.starts_with("COLOR_")) return (a.rows == 3 || a.rows == 4) && fraction;
-  if (name.starts_with("JOINTS_")) return a.rows == 4 && is_unsigned && !a.normalized;
-  if (name.starts_with("WEIGHTS_")) return a.rows == 4 && fraction;
-  return true;
-}
-
-bool target_format_allowed(const GltfAccessor& a, bool quantized) {
-  return a.columns == 1 && a.rows == 3 &&
-         (a.component == ComponentType::f32 || (quantized && is_small_integer(a.component)));
-}
-
-// The accessor of an attribute after checking its format and count, or nothing.
+// Formats and counts were checked with the model.
 class Attributes {
  public:
-  Attributes(const AccessorSource& source, const AttributeMap& map, uint64_t count,
-             std::string where, bool targets = false)
-      : source_(source),
-        map_(map),
-        count_(count),
-        where_(std::move(where)),
-        targets_(targets),
-        quantized_(uses_quantization(source.file)) {}
+  Attributes(const AccessorSource& source, const AttributeMap& map) : source_(source), map_(map) {}
 
   bool has(const std::string& name) const { return map_.contains(name); }
 
-  size_t checked(const std::string& name) const {
-    const size_t index = map_.at(name);
-    const GltfAccessor& accessor = source_.file.accessors[index];
-    const bool ok = targets_ ? target_format_allowed(accessor, quantized_)
-                             : format_allowed(name, accessor, quantized_);
-    if (!ok) refuse("The accessor's type is not allowed for " + name + ".", where_ + "/" + name);
-    if (accessor.count != count_) {
-      refuse("The attribute " + name + " has " + std::to_string(accessor.count) +
-                 " elements, but POSITION has " + std::to_string(count_) + ".",
-             where_ + "/" + name);
-    }
-    return index;
-  }
-
   std::vector<Vec3> triples(const std::string& name) const {
-    const std::vector<float> values = read_floats(source_, checked(name));
-    std::vector<Vec3> result(count_);
+    const std::vector<float> values = read_floats(source_, map_.at(name));
+    std::vector<Vec3> result(values.size() / 3);
     for (size_t i = 0; i < result.size(); ++i) {
       result[i] = {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
     }
@@ -89,17 +32,16 @@ class Attributes {
   }
 
   std::vector<Vec2> pairs(const std::string& name) const {
-    const std::vector<float> values = read_floats(source_, checked(name));
-    std::vector<Vec2> result(count_);
+    const std::vector<float> values = read_floats(source_, map_.at(name));
+    std::vector<Vec2> result(values.size() / 2);
     for (size_t i = 0; i < result.size(); ++i) result[i] = {values[2 * i], values[2 * i + 1]};
     return result;
   }
 
   std::vector<std::array<float, 4>> colors(const std::string& name) const {
-    const size_t index = checked(name);
-    const size_t rows = source_.file.accessors[index].rows;
-    const std::vector<float> values = read_floats(source_, index);
-    std::vector<std::array<float, 4>> result(count_);
+    const size_t rows = source_.file.accessors[map_.at(name)].rows;
+    const std::vector<float> values = read_floats(source_, map_.at(name));
+    std::vector<std::array<float, 4>> result(values.size() / rows);
     for (size_t i = 0; i < result.size(); ++i) {
       const float* v = &values[rows * i];
       result[i] = {v[0], v[1], v[2], rows == 4 ? v[3] : 1.0f};
@@ -108,12 +50,9 @@ class Attributes {
   }
 
   std::vector<JointWeights> influences(const std::string& set) const {
-    const std::vector<uint32_t> joints = read_unsigned(source_, checked("JOINTS_" + set));
-    if (!has("WEIGHTS_" + set)) {
-      refuse("The primitive has JOINTS_" + set + " but no WEIGHTS_" + set + ".", where_);
-    }
-    const std::vector<float> weights = read_floats(source_, checked("WEIGHTS_" + set));
-    std::vector<JointWeights> result(count_);
+    const std::vector<uint32_t> joints = read_unsigned(source_, map_.at("JOINTS_" + set));
+    const std::vector<float> weights = read_floats(source_, map_.at("WEIGHTS_" + set));
+    std::vector<JointWeights> result(joints.size() / 4);
     for (size_t i = 0; i < result.size(); ++i) {
       for (size_t k = 0; k < 4; ++k) {
         result[i].joints[k] = joints[4 * i + k];
@@ -126,10 +65,6 @@ class Attributes {
  private:
   const AccessorSource& source_;
   const AttributeMap& map_;
-  uint64_t count_;
-  std::string where_;
-  bool targets_;
-  bool quantized_;
 };
 
 // --- Morphs --------------------------------------------------------------------------------------
@@ -148,8 +83,7 @@ void morph(PrimitiveData& data, const AccessorSource& source, const GltfPrimitiv
            where + "/targets");
   }
   for (size_t k = 0; k < primitive.targets.size(); ++k) {
-    const Attributes target(source, primitive.targets[k], data.positions.size(),
-                            where + "/targets/" + std::to_string(k), true);
+    const Attributes target(source, primitive.targets[k]);
     const double weight = weights.empty() ? 0 : weights[k];
     if (weight == 0) continue;
     data.morphed = true;
@@ -166,12 +100,8 @@ std::vector<uint32_t> read_indices(const AccessorSource& source, size_t accessor
                                    const LoadBudget& budget) {
   const std::string place = "/accessors/" + std::to_string(accessor);
   const GltfAccessor& a = source.file.accessors[accessor];
-  if (a.components() != 1 || a.normalized) refuse("Indices must be plain scalars.", place);
   if (a.count > budget.triangles * 3 + 2) {
     throw Error(ErrorCode::too_large, "The scene has more triangles than allowed.", place);
-  }
-  if (a.view && source.file.views[*a.view].stride > component_size(a.component)) {
-    refuse("Indices must follow one another without a stride.", place);
   }
   std::vector<uint32_t> indices = read_unsigned(source, accessor);
   for (size_t i = 0; i < indices.size(); ++i) {
@@ -257,7 +187,7 @@ PrimitiveData read_primitive(const AccessorSource& source, const GltfPrimitive& 
     throw Error(ErrorCode::too_large, "The scene has more vertices than allowed.", where);
   }
   budget.vertices -= count;
-  const Attributes attributes(source, primitive.attributes, count, where + "/attributes");
+  const Attributes attributes(source, primitive.attributes);
   PrimitiveData data;
   data.positions = attributes.triples("POSITION");
   if (attributes.has("NORMAL")) data.normals = attributes.triples("NORMAL");
@@ -266,7 +196,9 @@ PrimitiveData read_primitive(const AccessorSource& source, const GltfPrimitive& 
     if (attributes.has(name)) data.texcoords[set] = attributes.pairs(name);
   }
   if (attributes.has("COLOR_0")) data.colors = attributes.colors("COLOR_0");
-  for (size_t set = 0; attributes.has("JOINTS_" + std::to_string(set)); ++set) {
+  for (size_t set = 0; attributes.has("JOINTS_" + std::to_string(set)) &&
+                       attributes.has("WEIGHTS_" + std::to_string(set));
+       ++set) {
     data.influences.push_back(attributes.influences(std::to_string(set)));
   }
   morph(data, source, primitive, weights, where);
