@@ -184,6 +184,19 @@ AoDocument make_document(const AoState& state, std::span<const float> openness,
   return document;
 }
 
+// A price that no round reached comes from the plan's model, which knows how each vertex of the
+// pilot converges, scaled by how the bake's time compared with the plan's word.
+void refine_prices(const Plan& plan, AccuracyRecord* record) {
+  const double pace =
+      plan.predicted_s > 0 && record->actual_s > 0 ? record->actual_s / plan.predicted_s : 1;
+  for (Price& price : record->time_to_error)
+    for (const Price& planned : plan.prices)
+      if (price.extrapolated && planned.error == price.error) {
+        price.samples = planned.samples;
+        price.seconds = planned.seconds * pace;
+      }
+}
+
 }  // namespace
 
 Assembly ao_assemble(AoState& state, const Plan& plan, std::span<const ChunkResult> chunks,
@@ -226,6 +239,7 @@ Assembly ao_assemble(AoState& state, const Plan& plan, std::span<const ChunkResu
   assembly.document = std::move(document);
   assembly.accuracy = summarise_accuracy(reports, target_error(state.spec), plan.predicted_s,
                                          "95 % half-width of openness, absolute");
+  refine_prices(plan, &assembly.accuracy);
   progress.update(1);
   return assembly;
 }

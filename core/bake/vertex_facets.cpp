@@ -61,7 +61,8 @@ bool make_facet(const SurfaceMesh& mesh, const std::array<uint32_t, 3>& triangle
   const double longest = std::max({length(pq), length(pr), length(r - q)});
 
   SurfacePoint point;
-  point.normal = to_float(normal);
+  // Adding zero turns -0 into +0, which a basis built from the normal would tell apart.
+  point.normal = to_float(normal) + Vec3{0, 0, 0};
   point.error = corner_error(p, q, r);
   const Vec3d error = to_double(point.error);
   const double lift =

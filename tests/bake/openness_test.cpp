@@ -282,5 +282,45 @@ TEST(Openness, ErrorBarsCoverTheTruth) {  // T3
   RecordProperty("adaptive", std::to_string(adaptive));
 }
 
+TEST(Openness, NeighboursDoNotShareNoise) {  // S6
+  const MeshData scene = merged(floor_plane(10), make_sphere({0, 1, 0}, 1, 96, 192));
+  const std::vector<Place> places(2000, Place{{1.6, 0, 0.3}});
+  OpennessParameters p;
+  p.target_error = 0;
+  p.max_samples = 256;
+  const auto estimates = openness_at(scene, places, p);
+  RunningMoments all;
+  for (const OpennessEstimate& e : estimates) all.add(e.openness);
+  double products = 0;
+  for (size_t i = 0; i + 1 < estimates.size(); i += 2)
+    products += (estimates[i].openness - all.mean) * (estimates[i + 1].openness - all.mean);
+  EXPECT_GT(all.variance(), 0);
+  EXPECT_LE(std::abs(products / 1000 / all.variance()), 0.13);
+}
+
+TEST(Openness, ErrorFallsFasterThanPlainSampling) {
+  const MeshData scene = merged(floor_plane(10), make_sphere({0, 1, 0}, 1, 192, 384));
+  std::vector<Place> places;
+  std::vector<double> truths;
+  for (int i = 0; i < 400; ++i) {
+    const double x = 1.2 + 0.005 * i;
+    const double azimuth = 0.61803398875 * 2 * kPi * i;
+    places.push_back({{x * std::sin(azimuth), 0, x * std::cos(azimuth)}});
+    truths.push_back(1 - std::pow(1 / (1 + x * x), 1.5));
+  }
+  const auto rmse = [&](uint64_t samples) {
+    OpennessParameters p;
+    p.target_error = 0;
+    p.max_samples = samples;
+    const auto estimates = openness_at(scene, places, p);
+    double sum = 0;
+    for (size_t i = 0; i < places.size(); ++i)
+      sum += std::pow(estimates[i].openness - truths[i], 2);
+    return std::sqrt(sum / static_cast<double>(places.size()));
+  };
+  const double slope = std::log2(rmse(8192) / rmse(512)) / 4;
+  EXPECT_NEAR(slope, -0.72, 0.12);
+}
+
 }  // namespace
 }  // namespace lightkiln
