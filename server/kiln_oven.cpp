@@ -41,6 +41,8 @@ int main(int argc, char** argv) {
   try {
     lightkiln::Channel channel{lightkiln::Descriptor(kSocket)};
     return lightkiln::serve_oven(channel, missing);
+  } catch (const lightkiln::PeerGone&) {
+    return 0;  // the worker has given up the job, or is no more
   } catch (const std::exception& error) {
     std::fprintf(stderr, "kiln-oven: %s\n", error.what());
     return 1;

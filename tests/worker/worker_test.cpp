@@ -2,6 +2,7 @@
 
 #include "server/worker/worker.h"
 
+#include <cctype>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -41,6 +42,7 @@ std::vector<std::byte> one_triangle() {
 std::vector<pid_t> children_of(pid_t parent) {
   std::vector<pid_t> children;
   for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    if (!std::isdigit(entry.path().filename().string()[0])) continue;
     std::ifstream in(entry.path() / "stat");
     std::string text{std::istreambuf_iterator<char>(in), {}};
     const size_t close = text.rfind(')');
