@@ -13,6 +13,9 @@
 
 namespace lightkiln {
 
+// A namespace of its own: proto has a JsonValue too, and one program links both.
+namespace gltf_json {
+
 struct JsonValue;
 struct JsonMember;
 using JsonArray = std::vector<JsonValue>;
@@ -38,6 +41,12 @@ struct JsonMember {
   std::string key;
   JsonValue value;
 };
+
+}  // namespace gltf_json
+using gltf_json::JsonArray;
+using gltf_json::JsonMember;
+using gltf_json::JsonObject;
+using gltf_json::JsonValue;
 
 JsonValue json_number(double value);
 JsonValue json_string(std::string value);
