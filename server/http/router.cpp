@@ -53,12 +53,15 @@ Router::Match Router::match(std::string_view method,
   int fallback = -1;
   for (size_t i = 0; i < entries_.size(); ++i) {
     if (!matches(entries_[i], segments, values)) continue;
-    result.values = values;
     if (entries_[i].method == method) {
       result.route = static_cast<int>(i);
+      result.values = values;
       return result;
     }
-    if (method == "HEAD" && entries_[i].method == "GET") fallback = static_cast<int>(i);
+    if (method == "HEAD" && entries_[i].method == "GET" && fallback < 0) {
+      fallback = static_cast<int>(i);
+      result.values = values;
+    }
     result.allowed.push_back(entries_[i].method);
   }
   if (fallback >= 0) {

@@ -61,7 +61,9 @@ int preferred_wait_s(const HttpHead& head) {
     int seconds = 0;
     const auto result = std::from_chars(one.data() + 5, one.data() + one.size(), seconds);
     // RFC 7240, section 2: a preference that makes no sense is ignored.
-    if (result.ptr != one.data() + one.size() || seconds < 0) continue;
+    if (result.ec == std::errc::invalid_argument || result.ptr != one.data() + one.size() ||
+        seconds < 0)
+      continue;
     return result.ec == std::errc() ? std::min(seconds, kMaxWaitSeconds) : kMaxWaitSeconds;
   }
   return 0;
