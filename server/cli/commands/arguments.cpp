@@ -65,7 +65,8 @@ struct Parser {
     sub->add_option("order", arguments.target, "A spec as JSON; paths are relative to it")
         ->required();
     sub->add_option("--name", arguments.name, "A name for the job");
-    sub->add_option("--label", labels, "key=value, to filter by; may be given again");
+    sub->add_option("--label", labels, "key=value, to filter by; may be given again")
+        ->allow_extra_args(false);
     sub->add_option("--priority", arguments.priority, "Larger is sooner")
         ->check(CLI::Range(-100, 100));
   }
@@ -124,7 +125,7 @@ struct Parser {
     ls->add_option("--kind", arguments.kind, "Only this kind")
         ->check(CLI::IsMember({"ambient_occlusion", "environment_maps", "probes"}));
     ls->add_option("--text", arguments.text, "Only where the id or name contains this");
-    ls->add_option("--label", labels, "Only with this label, key=value");
+    ls->add_option("--label", labels, "Only with this label, key=value")->allow_extra_args(false);
     ls->add_option("--limit", arguments.limit, "Jobs at the most")->check(CLI::Range(1, 500));
   }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <sstream>
 
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -17,7 +18,9 @@ constexpr size_t kBarCells = 24;
 
 std::string bar(double fraction) {
   const auto filled = static_cast<size_t>(std::clamp(fraction, 0.0, 1.0) * kBarCells);
-  return "[" + std::string(filled, '#') + std::string(kBarCells - filled, '.') + "]";
+  std::string cells(kBarCells, '.');
+  cells.replace(0, filled, filled, '#');
+  return '[' + cells + ']';
 }
 
 size_t terminal_columns() {
@@ -29,20 +32,21 @@ size_t terminal_columns() {
 }  // namespace
 
 std::string progress_sentence(const JobMessage& job) {
-  std::string text = job.state == "running" ? job.stage : job.state;
-  if (job.state == "running")
-    text +=
-        " " + std::to_string(std::lround(std::clamp(job.progress.fraction, 0.0, 1.0) * 100)) + " %";
+  std::ostringstream text;
+  const bool running = job.state == "running";
+  text << (running ? job.stage : job.state);
+  if (running)
+    text << ' ' << std::lround(std::clamp(job.progress.fraction, 0.0, 1.0) * 100) << " %";
   if (job.progress.total > 0)
-    text += ", " + std::to_string(job.progress.done) + " of " + std::to_string(job.progress.total) +
-            " " + job.progress.unit + "s";
+    text << ", " << job.progress.done << " of " << job.progress.total << ' ' << job.progress.unit
+         << 's';
   if (job.quality.error)
-    text +=
-        ", error " + format_error(*job.quality.error) + " of " + format_error(job.quality.target);
+    text << ", error " << format_error(*job.quality.error) << " of "
+         << format_error(job.quality.target);
   if (!job.terminal && job.progress.eta_s)
-    text += ", " + format_seconds(*job.progress.eta_s) + " left";
-  if (job.state == "queued" && !job.reason.empty()) text += ": " + job.reason;
-  return printable(text);
+    text << ", " << format_seconds(*job.progress.eta_s) << " left";
+  if (job.state == "queued" && !job.reason.empty()) text << ": " << job.reason;
+  return printable(text.str());
 }
 
 ProgressDisplay::ProgressDisplay(bool quiet)

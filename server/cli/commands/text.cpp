@@ -55,7 +55,7 @@ std::string format_count(uint64_t count) {
   std::string digits = std::to_string(count);
   for (size_t at = digits.size(); at > 3;) {
     at -= 3;
-    digits.insert(at, " ");
+    digits.insert(at, 1, ' ');
   }
   return digits;
 }
@@ -70,7 +70,8 @@ void print_table(std::ostream& out, const Table& table) {
     for (size_t i = 0; i < cells.size(); ++i) {
       const std::string gap(widths[i] - width(cells[i]), ' ');
       const bool right = i < table.right.size() && table.right[i];
-      line += (i > 0 ? "  " : "") + (right ? gap + cells[i] : cells[i] + gap);
+      if (i > 0) line.append(2, ' ');
+      line += right ? gap + cells[i] : cells[i] + gap;
     }
     line.erase(line.find_last_not_of(' ') + 1);
     out << line << '\n';
