@@ -17,7 +17,9 @@ constexpr uint64_t kCandidates = 64;
 constexpr uint32_t kReferencePaths = 1024;  // a replicate; rounds of the path sampler end here
 constexpr size_t kPathsPerBlock = 256;
 constexpr int kPilotRounds = 3;
-constexpr double kPilotTexels = 864;  // over all pilot probes
+// Texels over all pilot probes: at most so many, and this share of what is ordered.
+constexpr double kPilotTexels = 864;
+constexpr double kPilotShare = 0.25;
 // Deep enough that the mean albedo leaves a hundredth.
 constexpr double kPilotRest = 0.01;
 
@@ -87,9 +89,10 @@ std::vector<Round> pilot_rounds(ProbesState& state, const Plan& plan,
                                 const std::vector<uint64_t>& probes, Progress& progress) {
   const RadianceScene& scene = state.radiance_for(plan_selection(state, plan));
   const int size = state.parameters().cubemap.size;
-  const int cells = std::max(
-      2, static_cast<int>(std::sqrt(kPilotTexels / (6 * static_cast<double>(probes.size())))));
   const double all = static_cast<double>(plan.elements) * 6 * size * size;
+  const double wanted = std::min(kPilotTexels, kPilotShare * all);
+  const int cells =
+      std::max(2, static_cast<int>(std::sqrt(wanted / (6 * static_cast<double>(probes.size())))));
   std::vector<Round> rounds(kPilotRounds);
   double done = 0.3;
   for (const uint64_t probe : probes) {

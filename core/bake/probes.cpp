@@ -6,6 +6,7 @@
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/image/decode.h"
+#include "core/sphere/harmonic_transform.h"
 
 namespace lightkiln {
 
@@ -59,6 +60,17 @@ double share_done(double error, double target) {
   return error > target ? std::pow(target / error, 1.5) : 1;
 }
 
+// Around a scene without triangles there is the environment alone, whose harmonics are known but
+// for the rounding of quadrature.
+constexpr double kProjectionTolerance = 1e-9;
+ShRgb environment_harmonics(const Environment& environment, int bands, int threads,
+                            Progress& progress) {
+  const std::vector<double> weights(static_cast<size_t>(bands), 1.0);
+  const int points = row_gauss_points(environment.radiance.height, weights, kProjectionTolerance);
+  return world_harmonics(project_latlong(environment.radiance, bands, points, threads, progress),
+                         bands);
+}
+
 // Doubles until the error is ordered, or the samples are spent.
 ProbeResult bake_probe(ProbesState& state, const RadianceScene& scene, const CubeTexels& texels,
                        const Plan& plan, uint64_t probe, Progress& progress, double progress_begin,
@@ -95,8 +107,15 @@ ProbeResult bake_probe(ProbesState& state, const RadianceScene& scene, const Cub
                     : limited  ? AccuracyStatus::budget_limited
                                : AccuracyStatus::converged;
   result.samples = sampling.samples();
-  result.sh = sampling.harmonics();
-  result.sh_error = sampling.harmonics_error();
+  if (state.scene.bounds.empty() && scene.selection().environment) {
+    Progress quiet;
+    result.sh =
+        environment_harmonics(*state.light(), parameters.sh.bands, state.grants.threads, quiet);
+    result.sh_error = kProjectionTolerance;
+  } else {
+    result.sh = sampling.harmonics();
+    result.sh_error = sampling.harmonics_error();
+  }
   for (size_t i = 0; i < texels.texels.size(); ++i) {
     const Vec3 rgb = sampling.texel(i);
     result.radiance.insert(result.radiance.end(), {rgb.x, rgb.y, rgb.z});
