@@ -14,18 +14,6 @@
 
 namespace lightkiln {
 
-RayCounters& RayCounters::operator+=(const RayCounters& other) {
-  occlusion_rays += other.occlusion_rays;
-  nearest_rays += other.nearest_rays;
-  shadow_rays += other.shadow_rays;
-  bounce_rays += other.bounce_rays;
-  rejected_rays += other.rejected_rays;
-  filter_calls += other.filter_calls;
-  texture_reads += other.texture_reads;
-  environment_reads += other.environment_reads;
-  return *this;
-}
-
 namespace {
 
 // Embree's build asserts on components above 1.844e18; the gate stays below with room to spare.
