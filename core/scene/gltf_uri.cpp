@@ -38,8 +38,10 @@ std::vector<std::byte> decode_data_uri(const std::string& uri, const std::string
     refuse("A data URI in a glTF must read 'data:<type>;base64,<data>'.", where);
   }
   std::string_view text = std::string_view(uri).substr(comma + 1);
-  while (!text.empty() && text.back() == '=' && uri.size() - comma - 1 - text.size() < 2) {
-    text.remove_suffix(1);
+  // Padding may be left out, but where it stands it must complete a group of four.
+  if (text.ends_with('=')) {
+    if (text.size() % 4 != 0) refuse("The base64 of this data URI is padded wrongly.", where);
+    text.remove_suffix(text.ends_with("==") ? 2 : 1);
   }
   if (text.size() % 4 == 1) refuse("The base64 of this data URI ends inside a byte.", where);
   std::vector<std::byte> bytes;
