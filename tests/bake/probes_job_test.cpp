@@ -1,0 +1,134 @@
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "core/bake/bake.h"
+#include "core/image/exr.h"
+#include "tests/support/lit_scene.h"
+
+namespace lightkiln::test {
+namespace {
+
+const std::string kDigest = "sha256:" + std::string(64, 'a');
+
+// A room of 8 m a side in albedo 0.5 that shines with 1 + 0.5 + 0.25 + ... = 2 in every direction,
+// as a client would order it.
+struct Job {
+  std::vector<std::byte> glb;
+  Spec spec;
+
+  Job() {
+    MeshData walls = reversed(make_box({1, 2, 3}, {9, 10, 11}));
+    glb = make_glb(walls, grey(0.5f, 1));
+    ProbesParameters parameters;
+    parameters.positions = {{5, 6, 7}, {3, 6, 7}, {20, 6, 7}};
+    parameters.cubemap.size = 4;
+    spec.parameters = parameters;
+    spec.scene = InputRef{kDigest, {}};
+    spec.accuracy.target_error = 0.01;
+  }
+  Assembly bake(Plan* plan = nullptr, int threads = 1) const {
+    Inputs inputs;
+    inputs.blobs[kDigest] = glb;
+    Grants grants;
+    grants.threads = threads;
+    Progress progress;
+    return bake_all(spec, inputs, grants, progress, plan);
+  }
+};
+
+TEST(ProbesJob, GivesTwoImagesAProbeAndADocument) {
+  Plan plan;
+  const Assembly result = Job().bake(&plan);
+  EXPECT_EQ(plan.kind, Kind::probes);
+  EXPECT_EQ(plan.elements, 3u);
+  EXPECT_EQ(plan.element_unit, "probe");
+  EXPECT_EQ(plan.prices.size(), 5u);
+  EXPECT_FALSE(plan.effects.empty());
+  ASSERT_EQ(result.artifacts.size(), 6u);
+  const char* const names[] = {"probe_0000_radiance.exr", "probe_0000_distance.exr",
+                               "probe_0001_radiance.exr", "probe_0001_distance.exr",
+                               "probe_0002_radiance.exr", "probe_0002_distance.exr"};
+  for (size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(result.artifacts[i].name, names[i]);
+    EXPECT_EQ(result.artifacts[i].media_type, "image/x-exr");
+    const DecodedImage decoded = read_exr(result.artifacts[i].bytes);
+    EXPECT_EQ(decoded.image.width, 4);
+    EXPECT_EQ(decoded.image.height, 24);
+    EXPECT_EQ(decoded.image.channels, i % 2 == 0 ? 3 : 1);
+    // Texel centres lie at (i + 1/2)/N, so the standard attribute must not claim otherwise.
+    EXPECT_EQ(decoded.envmap, EnvmapAttribute::none);
+  }
+  const Image radiance = read_exr(result.artifacts[0].bytes).image;
+  for (const float value : radiance.pixels) EXPECT_NEAR(value, 2, 0.01);
+
+  const auto& document = std::get<ProbesDocument>(result.document);
+  EXPECT_EQ(document.cubemap_size, 4);
+  ASSERT_EQ(document.probes.size(), 3u);
+  EXPECT_EQ(document.probes[0].status, ProbeStatus::valid);
+  EXPECT_NEAR(document.probes[0].distance_min, 4, 0.02);
+  EXPECT_NEAR(document.probes[1].distance_min, 2, 0.02);
+  EXPECT_EQ(document.probes[2].status, ProbeStatus::inside_geometry);  // backs all round
+  EXPECT_EQ(document.probes[1].position, (Vec3d{3, 6, 7}));
+  EXPECT_EQ(document.probes[1].radiance_artifact, "probe_0001_radiance.exr");
+}
+
+TEST(ProbesJob, SelftestTellsWhatTheCoefficientsGive) {
+  const Assembly result = Job().bake();
+  const ProbeDocument& probe = std::get<ProbesDocument>(result.document).probes[0];
+  ASSERT_EQ(probe.sh.selftest.size(), 6u);
+  for (const ShSelftest& test : probe.sh.selftest) {
+    EXPECT_NEAR(test.radiance.y, 2, 0.02);
+    EXPECT_NEAR(test.irradiance.y, 2 * kPi, 0.02 * kPi);
+  }
+}
+
+TEST(ProbesJob, AccuracyCountsWhatWasTraced) {
+  Plan plan;
+  const Assembly result = Job().bake(&plan);
+  const AccuracyRecord& accuracy = result.accuracy;
+  EXPECT_EQ(accuracy.status, AccuracyStatus::converged);
+  EXPECT_EQ(accuracy.elements, 3u);
+  EXPECT_EQ(accuracy.converged_share, 1);
+  EXPECT_EQ(accuracy.target_error, 0.01);
+  EXPECT_EQ(accuracy.predicted_s, plan.predicted_s);
+  ASSERT_FALSE(accuracy.rounds.empty());
+  EXPECT_EQ(accuracy.rounds[0].samples, 64u);
+  EXPECT_EQ(accuracy.counters.shadow_rays, 0u);
+  EXPECT_EQ(accuracy.counters.texture_reads, 0u);
+  uint64_t rays = 0;
+  for (const Round& round : accuracy.rounds) rays += round.rays;
+  // Beside the rounds, each probe looks around with 1024 rays and once through each texel.
+  EXPECT_EQ(accuracy.counters.nearest_rays + accuracy.counters.bounce_rays, rays + 3 * (1024 + 96));
+}
+
+TEST(ProbesJob, SameOrderSameBytes) {
+  const Job job;
+  const Assembly one = job.bake(nullptr, 1), two = job.bake(nullptr, 2);
+  for (size_t i = 0; i < one.artifacts.size(); ++i) {
+    EXPECT_EQ(one.artifacts[i].bytes, two.artifacts[i].bytes) << one.artifacts[i].name;
+  }
+}
+
+// Power-of-two scales change exponents only.
+TEST(ProbesJob, ScaleOfTheWorldLeavesRadianceAlone) {
+  Job job;
+  const Assembly plain = job.bake();
+  MeshData walls = reversed(make_box({1, 2, 3}, {9, 10, 11}));
+  job.glb = make_glb(scaled(walls, 0x1p20f), grey(0.5f, 1));
+  auto& parameters = std::get<ProbesParameters>(job.spec.parameters);
+  for (Vec3d& position : parameters.positions) position *= 0x1p20;
+  const Assembly large = job.bake();
+  for (size_t i = 0; i < plain.artifacts.size(); i += 2) {
+    const Image a = read_exr(plain.artifacts[i].bytes).image;
+    const Image b = read_exr(large.artifacts[i].bytes).image;
+    EXPECT_EQ(a.pixels, b.pixels);
+  }
+  const Image a = read_exr(plain.artifacts[1].bytes).image;
+  const Image b = read_exr(large.artifacts[1].bytes).image;
+  for (size_t i = 0; i < a.pixels.size(); ++i) EXPECT_EQ(a.pixels[i] * 0x1p20f, b.pixels[i]);
+}
+
+}  // namespace
+}  // namespace lightkiln::test
