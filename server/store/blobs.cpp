@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "core/base/error.h"
+#include "server/store/job_id.h"
 #include "server/store/process_identity.h"
 #include "server/store/storage_failure.h"
 
@@ -39,12 +40,12 @@ void fsync_folder(const std::string& path) {
   close(fd);
 }
 
-// Temporary names begin with their maker's identity, slashes replaced.
-std::string identity_prefix() {
+// Temporary names: their maker's identity with slashes replaced, '+', what makes them unique.
+std::string make_draft_prefix() {
   std::string identity = own_process_identity();
   for (char& c : identity)
     if (c == '/') c = '_';
-  return identity;
+  return identity + "+" + random_hex(8) + ".";
 }
 
 void sweep_drafts(const fs::path& folder) {
@@ -60,7 +61,7 @@ void sweep_drafts(const fs::path& folder) {
 
 }  // namespace
 
-Blobs::Blobs(const std::string& root) : root_(root) {
+Blobs::Blobs(const std::string& root) : root_(root), draft_prefix_(make_draft_prefix()) {
   fs::create_directories(root_ + "/incoming");
   fs::create_directories(root_ + "/quarantine");
   for (int shard = 0; shard < 256; ++shard) {
@@ -74,9 +75,7 @@ Blobs::Blobs(const std::string& root) : root_(root) {
 Blobs::Draft::Draft(Blobs& blobs) : blobs_(blobs) {
   {
     const std::lock_guard lock(blobs_.mutex_);
-    static const std::string prefix = identity_prefix();
-    path_ = blobs_.root_ + "/incoming/" + prefix + "+" + std::to_string(++blobs_.drafts_) + "." +
-            std::to_string(reinterpret_cast<uintptr_t>(&blobs_));
+    path_ = blobs_.root_ + "/incoming/" + blobs_.draft_prefix_ + std::to_string(++blobs_.drafts_);
   }
   fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
   if (fd_ < 0)

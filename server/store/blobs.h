@@ -56,6 +56,7 @@ class Blobs {
   void quarantine(const std::string& digest);
 
   std::string root_;
+  std::string draft_prefix_;
   std::mutex mutex_;
   std::unordered_set<std::string> verified_;
   uint64_t drafts_ = 0;

@@ -139,8 +139,9 @@ void Database::checkpoint() {
     fail(db_, "moving the log into the database");
 }
 
-Transaction::Transaction(Database& db) : db_(db) {
-  db_.execute("BEGIN IMMEDIATE");
+Transaction::Transaction(Database& db, bool sync) : db_(db) {
+  db_.execute(sync ? "PRAGMA synchronous=FULL; BEGIN IMMEDIATE"
+                   : "PRAGMA synchronous=NORMAL; BEGIN IMMEDIATE");
 }
 Transaction::~Transaction() {
   if (!db_.in_transaction()) return;

@@ -93,7 +93,8 @@ class Database {
 // BEGIN IMMEDIATE ... COMMIT; rolls back when it goes out of scope uncommitted.
 class Transaction {
  public:
-  explicit Transaction(Database& db);
+  // With `sync` false the commit reaches the disk with the next one that is synced.
+  explicit Transaction(Database& db, bool sync = true);
   ~Transaction();
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;

@@ -1,7 +1,6 @@
 #include "server/store/process_identity.h"
 
 #include <fstream>
-#include <iterator>
 #include <sstream>
 
 #include <sys/stat.h>
@@ -21,7 +20,8 @@ struct ProcessFacts {
 // ')'. State is field 3, the start time field 22 (proc(5)).
 ProcessFacts process_facts(const std::string& pid) {
   std::ifstream in("/proc/" + pid + "/stat");
-  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  std::string text;
+  std::getline(in, text, '\0');  // a process that ends meanwhile leaves this empty
   const size_t close = text.rfind(')');
   if (close == std::string::npos) return {};
   std::istringstream fields(text.substr(close + 1));

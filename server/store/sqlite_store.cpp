@@ -98,11 +98,11 @@ SqliteStore::FileLock::~FileLock() {
   flock(fd_, LOCK_UN);
 }
 
-SqliteStore::Writer::Writer(SqliteStore& store)
+SqliteStore::Writer::Writer(SqliteStore& store, Durability durability)
     : store_(store),
       mutex_(store.write_mutex_),
       file_lock_(store.lock_.get()),
-      transaction_(*store.writer_) {}
+      transaction_(*store.writer_, durability == Durability::at_once) {}
 SqliteStore::Writer::~Writer() = default;
 
 void SqliteStore::Writer::commit() {

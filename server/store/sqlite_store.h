@@ -118,10 +118,14 @@ class SqliteStore::FileLock {
   int fd_;
 };
 
+// Whether a commit reaches the disk before it returns. Leases need not: after a power loss no
+// worker holds one, and a killed process loses nothing that the kernel has.
+enum class Durability { at_once, with_the_next };
+
 // The right to write: in-process mutex, flock, BEGIN IMMEDIATE.
 class SqliteStore::Writer {
  public:
-  explicit Writer(SqliteStore& store);
+  explicit Writer(SqliteStore& store, Durability durability = Durability::at_once);
   ~Writer();
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;
