@@ -98,11 +98,16 @@ OpennessBatch estimate_vertices(const AoState& state, const OpennessKernel& kern
   for (Round& round : batch.report.rounds)
     round.wall_s =
         batch.report.cpu_s > 0 ? batch.report.wall_s * round.cpu_s / batch.report.cpu_s : 0;
-  for (const auto& history : histories) {
-    batch.history.resize(std::max(batch.history.size(), history.size()));
-    for (size_t round = 0; round < history.size(); ++round)
-      batch.history[round].insert(batch.history[round].end(), history[round].begin(),
-                                  history[round].end());
+  // A block that stopped earlier keeps its last errors; one without rays has none.
+  for (size_t block = 0; block < histories.size(); ++block) {
+    const auto& history = histories[block];
+    for (size_t round = 0; round < batch.report.rounds.size(); ++round) {
+      if (batch.history.size() <= round) batch.history.emplace_back(ids.size(), 0.0);
+      if (history.empty()) continue;
+      const std::vector<double>& errors = history[std::min(round, history.size() - 1)];
+      std::copy(errors.begin(), errors.end(),
+                batch.history[round].begin() + static_cast<ptrdiff_t>(block * kBlock));
+    }
   }
   return batch;
 }

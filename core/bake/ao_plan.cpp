@@ -93,6 +93,8 @@ Pilot run_pilot(const AoState& state, OpennessParameters parameters, Progress& p
 double mean_samples(const Pilot& pilot, double target, uint64_t cap) {
   double sum = 0;
   for (size_t e = 0; e < pilot.elements; ++e) {
+    // Only elements without rays have no error at all.
+    if (pilot.errors.empty() || pilot.errors[0][e] == 0) continue;
     uint64_t samples = kFirstSamples;
     double error = 0;
     for (int look = 1;; ++look, samples *= 2) {
@@ -143,6 +145,14 @@ Effect max_distance_effect(const AoState& state) {
           "Surfaces farther than " + number(*p.max_distance) + " count as open sky.", 1};
 }
 
+Effect certificate_effect(const OpennessKernel& kernel) {
+  const bool active = kernel.reach() != INFINITY;
+  return {"open_certificates", active,
+          active ? "Vertices with nothing above their planes within reach are 1 without a ray."
+                 : "Rays reach to the end of the scene: only a ray can tell that nothing is hit.",
+          0};
+}
+
 Effect falloff_effect(const AoState& state, const OpennessKernel& kernel) {
   const AmbientOcclusionParameters& p = state.parameters();
   if (p.falloff == Falloff::none)
@@ -181,7 +191,7 @@ void add_alpha_effects(const AoState& state, Plan* plan) {
 
 void add_effects(const AoState& state, const OpennessKernel& kernel, Plan* plan) {
   plan->effects = {hit_distance_effect(state), max_distance_effect(state),
-                   falloff_effect(state, kernel)};
+                   falloff_effect(state, kernel), certificate_effect(kernel)};
   add_alpha_effects(state, plan);
   for (const char* name : {"environment", "environment_variation", "emissive_surfaces",
                            "punctual_lights", "diffuse_bounces"})

@@ -77,6 +77,7 @@ struct OpennessKernel::Impl {
 
   Impl(const Tracer& tracer_, const OpennessParameters& p);
 
+  bool surely_open(std::span<const Facet> facets, RayCounters& counters) const;
   Look look_from(const OpennessElement& element) const;
   // Calls each(packet) for the rays of one block of points, cell by cell.
   template <typename Each>
@@ -104,10 +105,25 @@ OpennessKernel::Impl::Impl(const Tracer& tracer_, const OpennessParameters& p)
              static_cast<uint32_t>(p.max_samples / kReplicates)),
       quantile_95(student_t(0.95, kReplicates - 1)) {}
 
+// Every ray starts at a facet's origin, leaves into the half-space above it and ends within reach:
+// all of them stay in one sphere and above their planes.
+bool OpennessKernel::Impl::surely_open(std::span<const Facet> facets, RayCounters& counters) const {
+  if (!parameters.certificates || t_far == INFINITY) return false;
+  std::vector<HalfSpace> above;
+  float spread = 0;
+  for (const Facet& facet : facets) {
+    above.push_back({facet.origin, facet.normal});
+    spread = std::max(spread, length(facet.origin - facets[0].origin));
+  }
+  return tracer->surely_clear(facets[0].origin, 1.0001f * (t_far + spread), above, counters);
+}
+
 Look OpennessKernel::Impl::look_from(const OpennessElement& element) const {
   Look look;
   look.facets = element.facets;
-  look.masks = ReplicateMasks(hash_combine(parameters.seed, element.id));
+  const uint64_t shifts =
+      hash_combine(parameters.seed, static_cast<uint64_t>(DimensionSet::ao_shift));
+  look.masks = ReplicateMasks(hash_combine(shifts, element.id));
   double total = 0;
   for (const Facet& facet : element.facets) {
     look.bases.push_back(make_basis(facet.normal));
@@ -124,6 +140,19 @@ Look OpennessKernel::Impl::look_from(const OpennessElement& element) const {
 }
 
 namespace {
+
+// The first facet whose threshold lies above z. Few facets are the rule, a fan of many the
+// exception.
+size_t facet_at(const Look& look, uint32_t z) {
+  const size_t last = look.thresholds.size() - 1;
+  if (last < 16) {
+    size_t f = 0;
+    while (f < last && z >= look.thresholds[f]) ++f;
+    return f;
+  }
+  const auto above = std::upper_bound(look.thresholds.begin(), look.thresholds.end(), z);
+  return std::min(static_cast<size_t>(above - look.thresholds.begin()), last);
+}
 
 // Fills the packet's rays for one cell: lane r looks along replicate r's point, from the facet that
 // the point's third coordinate chooses.
@@ -144,8 +173,7 @@ void aim(const Look& look, const CellPoints& cell, Distribution distribution, Ra
     return;
   }
   for (size_t i = 0; i < kPacketLanes; ++i) {
-    size_t f = 0;
-    while (cell.z[i] >= look.thresholds[f] && f + 1 < look.thresholds.size()) ++f;
+    const size_t f = facet_at(look, cell.z[i]);
     const Vec3 direction = look.bases[f].to_world({x[i], y[i], z[i]});
     const Vec3& origin = look.facets[f].origin;
     packet.origin_x[i] = origin.x;
@@ -265,7 +293,8 @@ void OpennessKernel::estimate(std::span<const OpennessElement> elements,
   std::vector<size_t> active;
   for (size_t i = 0; i < elements.size(); ++i) {
     estimates[i] = {};
-    if (elements[i].facets.empty()) continue;
+    if (elements[i].facets.empty() || impl_->surely_open(elements[i].facets, report->counters))
+      continue;
     looks[i] = impl_->look_from(elements[i]);
     active.push_back(i);
   }

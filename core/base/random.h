@@ -46,7 +46,7 @@ Point2 sobol2(uint64_t key, uint32_t index);
 // points.
 enum class DimensionSet : uint64_t {
   ao_direction = 1,
-  ao_facet = 2,
+  ao_shift = 2,
   probe_pixel = 16,
   probe_pilot = 17,
   path_base = 64,  // path_base + 4 * bounce + {0 scatter, 1 environment, 2 emissive, 3 punctual}

@@ -368,47 +368,48 @@ void Tracer::nearest16(const RayPacket16& packet, float t_hit[16], RayCounters& 
       t_hit[i] = query.ray.tfar[i];
 }
 
-// Barycentric interpolation b0 p0 + b1 p1 + b2 p2 rounds to within gamma(7) times the sum of
-// absolute products on each axis, gamma(n) = n e / (1 - n e), e = 2^-24 (Pharr, Jakob, Humphreys,
-// "Physically Based Rendering", 4th ed., sections 6.8.4 and 6.8.5).
-SurfacePoint surface_point(const Scene& scene, const Hit& hit) {
-  constexpr float kGamma7 = 7 * 0x1p-24f / (1 - 7 * 0x1p-24f);
-  const SurfaceMesh& mesh = scene.meshes[hit.mesh];
-  const auto& corner = mesh.triangles[hit.triangle];
-  const Vec3& a = mesh.positions[corner[0]];
-  const Vec3& b = mesh.positions[corner[1]];
-  const Vec3& c = mesh.positions[corner[2]];
-  const float w = 1 - hit.u - hit.v;
-  SurfacePoint point;
-  for (int axis = 0; axis < 3; ++axis) {
-    const float pa = w * a[axis];
-    const float pb = hit.u * b[axis];
-    const float pc = hit.v * c[axis];
-    point.position[axis] = pa + pb + pc;
-    point.error[axis] = kGamma7 * (std::fabs(pa) + std::fabs(pb) + std::fabs(pc));
-  }
-  const Vec3d normal = cross(to_double(b) - to_double(a), to_double(c) - to_double(a));
-  const double size = length(normal);
-  point.normal = size > 0 ? to_float(normal / size) : Vec3{0, 0, 1};
-  return point;
+namespace {
+
+struct ClearSearch {
+  const Scene* scene;
+  std::span<const HalfSpace> half_spaces;
+  int visits_left = 256;
+  bool clear = true;
+};
+
+// Embree calls this for every triangle whose box meets the sphere. Shrinking the radius to nothing
+// ends the search.
+bool visit_triangle(RTCPointQueryFunctionArguments* args) {
+  ClearSearch& search = *static_cast<ClearSearch*>(args->userPtr);
+  const SurfaceMesh& mesh = search.scene->meshes[args->geomID];
+  bool below = search.visits_left-- > 0;
+  for (const HalfSpace& space : search.half_spaces)
+    for (const uint32_t corner : mesh.triangles[args->primID])
+      below &= dot(to_double(space.normal),
+                   to_double(mesh.positions[corner]) - to_double(space.point)) <= 0;
+  if (below) return false;
+  search.clear = false;
+  args->query->radius = 0;
+  return true;
 }
 
-// A plane through zero, which recentring makes of every flat scene, has no rounding error along its
-// normal, and one ulp above zero is flushed back to it: a least distance far below any error of the
-// normalised scene, and far above where products underflow, keeps its rays off it.
-Vec3 offset_origin(const SurfacePoint& point, const Vec3& direction) {
-  constexpr float kLeastDistance = 0x1p-60f;
-  const Vec3& n = point.normal;
-  const float bound = std::fabs(n.x) * point.error.x + std::fabs(n.y) * point.error.y +
-                      std::fabs(n.z) * point.error.z;
-  const float distance = std::max(bound, kLeastDistance);
-  const Vec3 offset = n * (dot(direction, n) < 0 ? -distance : distance);
-  Vec3 moved = point.position + offset;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (offset[axis] > 0) moved[axis] = std::nextafter(moved[axis], INFINITY);
-    if (offset[axis] < 0) moved[axis] = std::nextafter(moved[axis], -INFINITY);
-  }
-  return moved;
+}  // namespace
+
+bool Tracer::surely_clear(const Vec3& around, float radius, std::span<const HalfSpace> half_spaces,
+                          RayCounters& counters) const {
+  if (!in_range(around.x) || !in_range(around.y) || !in_range(around.z) || !(radius >= 0))
+    return false;
+  ++counters.point_queries;
+  ClearSearch search{impl_->scene, half_spaces};
+  RTCPointQuery query{};
+  query.x = around.x;
+  query.y = around.y;
+  query.z = around.z;
+  query.radius = radius;
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  rtcPointQuery(impl_->embree, &query, &context, visit_triangle, &search);
+  return search.clear;
 }
 
 }  // namespace lightkiln

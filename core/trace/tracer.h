@@ -50,6 +50,7 @@ struct RayCounters {
   uint64_t filter_calls = 0;
   uint64_t texture_reads = 0;
   uint64_t environment_reads = 0;
+  uint64_t point_queries = 0;
   RayCounters& operator+=(const RayCounters& other);
 };
 
@@ -60,6 +61,12 @@ struct alignas(64) RayPacket16 {
   float t_near[16];
   float t_far[16];
   int32_t valid[16];  // -1 = trace, 0 = leave
+};
+
+// The half-space above a plane: points p with dot(normal, p - point) > 0.
+struct HalfSpace {
+  Vec3 point;
+  Vec3 normal;
 };
 
 class Tracer {
@@ -81,6 +88,12 @@ class Tracer {
   uint32_t occluded16(const RayPacket16& packet, RayCounters& counters) const;
   // Distances to the nearest hit (INFINITY = miss) of every valid lane.
   void nearest16(const RayPacket16& packet, float t_hit[16], RayCounters& counters) const;
+
+  // True when it is certain that no triangle within `radius` of `centre` reaches into any of the
+  // half-spaces. False means "perhaps not": bounding boxes stand for triangles at the sphere's rim,
+  // and the search gives up after 256 triangles.
+  bool surely_clear(const Vec3& centre, float radius, std::span<const HalfSpace> half_spaces,
+                    RayCounters& counters) const;
 
  private:
   struct Impl;

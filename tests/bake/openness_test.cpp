@@ -282,6 +282,31 @@ TEST(Openness, ErrorBarsCoverTheTruth) {  // T3
   RecordProperty("adaptive", std::to_string(adaptive));
 }
 
+TEST(Openness, CertificatesChangeNoValueAndSaveRays) {
+  // A grid of places on a floor with one wall: most see nothing within reach.
+  std::vector<Place> places;
+  for (int i = 0; i < 400; ++i) places.push_back({{-5 + 0.5 * (i % 20), 0, -5 + 0.5 * (i / 20)}});
+  OpennessParameters p = thorough();
+  p.max_samples = 4096;
+  p.max_distance = 0.75;
+  const MeshData scene = merged(floor_plane(10), wall(1.1f, 5, 2));
+  const auto with = openness_at(scene, places, p);
+  p.certificates = false;
+  const auto without = openness_at(scene, places, p);
+  int certified = 0;
+  for (size_t i = 0; i < places.size(); ++i) {
+    EXPECT_EQ(with[i].openness, without[i].openness);
+    if (with[i].status != AccuracyStatus::exact) continue;
+    ++certified;
+    EXPECT_EQ(with[i].samples, 0u);
+    EXPECT_EQ(with[i].half_width, 0);
+    // None within reach of the wall.
+    EXPECT_GT(std::abs(places[i].position.x - 1.1), 0.75);
+  }
+  EXPECT_GT(certified, 300);
+  EXPECT_LT(certified, 400);
+}
+
 TEST(Openness, NeighboursDoNotShareNoise) {  // S6
   const MeshData scene = merged(floor_plane(10), make_sphere({0, 1, 0}, 1, 96, 192));
   const std::vector<Place> places(2000, Place{{1.6, 0, 0.3}});
