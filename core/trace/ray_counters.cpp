@@ -13,6 +13,7 @@ RayCounters& RayCounters::operator+=(const RayCounters& other) {
   filter_calls += other.filter_calls;
   texture_reads += other.texture_reads;
   environment_reads += other.environment_reads;
+  point_queries += other.point_queries;
   return *this;
 }
 

@@ -1,5 +1,4 @@
-// Points on surfaces, origins that leave them, and the sum of counters: what rays need but Embree
-// does not.
+// Points on surfaces and the origins of rays that leave them.
 
 #include <algorithm>
 #include <cmath>
@@ -7,19 +6,6 @@
 #include "core/trace/tracer.h"
 
 namespace lightkiln {
-
-RayCounters& RayCounters::operator+=(const RayCounters& other) {
-  occlusion_rays += other.occlusion_rays;
-  nearest_rays += other.nearest_rays;
-  shadow_rays += other.shadow_rays;
-  bounce_rays += other.bounce_rays;
-  rejected_rays += other.rejected_rays;
-  filter_calls += other.filter_calls;
-  texture_reads += other.texture_reads;
-  environment_reads += other.environment_reads;
-  point_queries += other.point_queries;
-  return *this;
-}
 
 // Barycentric interpolation b0 p0 + b1 p1 + b2 p2 rounds to within gamma(7) times the sum of
 // absolute products on each axis, gamma(n) = n e / (1 - n e), e = 2^-24 (Pharr, Jakob, Humphreys,

@@ -377,11 +377,29 @@ struct ClearSearch {
   bool clear = true;
 };
 
-// Embree calls this for every triangle whose box meets the sphere. Shrinking the radius to nothing
-// ends the search.
+// Squared distance from p to the box around a triangle.
+double box_distance2(const SurfaceMesh& mesh, const std::array<uint32_t, 3>& triangle,
+                     const Vec3d& p) {
+  double sum = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double a = static_cast<double>(mesh.positions[triangle[0]][axis]);
+    const double b = static_cast<double>(mesh.positions[triangle[1]][axis]);
+    const double c = static_cast<double>(mesh.positions[triangle[2]][axis]);
+    const double outside =
+        std::max({std::min({a, b, c}) - p[axis], p[axis] - std::max({a, b, c}), 0.0});
+    sum += outside * outside;
+  }
+  return sum;
+}
+
+// Embree calls this for the triangles of every leaf whose box meets the sphere. Shrinking the
+// radius to nothing ends the search.
 bool visit_triangle(RTCPointQueryFunctionArguments* args) {
   ClearSearch& search = *static_cast<ClearSearch*>(args->userPtr);
   const SurfaceMesh& mesh = search.scene->meshes[args->geomID];
+  const Vec3d around{args->query->x, args->query->y, args->query->z};
+  const double radius = args->query->radius;
+  if (box_distance2(mesh, mesh.triangles[args->primID], around) > radius * radius) return false;
   bool below = search.visits_left-- > 0;
   for (const HalfSpace& space : search.half_spaces)
     for (const uint32_t corner : mesh.triangles[args->primID])
