@@ -105,6 +105,10 @@ double triangle_distance(const Vec3d& p, const Vec3d& a, const Vec3d& b, const V
       {segment_distance(p, a, b), segment_distance(p, b, c), segment_distance(p, c, a)});
 }
 
+// Triangles looked at for all lights together; past it a light is taken to touch a surface, which
+// leaves its bound infinite instead of making the survey slow.
+constexpr uint64_t kMostDistances = 50'000'000;
+
 // In normalised units; infinite for a scene without triangles.
 double nearest_surface(const Scene& scene, const Vec3d& point) {
   double nearest = INFINITY;
@@ -119,6 +123,7 @@ double nearest_surface(const Scene& scene, const Vec3d& point) {
 }
 
 void survey_punctual(const Scene& scene, LightSurvey* survey) {
+  uint64_t looked_at = 0;
   for (const PunctualLight& light : scene.lights) {
     const double intensity = luminance(to_double(light.intensity));
     if (!(intensity > 0)) continue;
@@ -126,9 +131,11 @@ void survey_punctual(const Scene& scene, LightSurvey* survey) {
     ++kind.count;
     double irradiance = intensity;
     if (light.kind != LightKind::directional) {
-      const double distance =
-          nearest_surface(scene, scene.normalisation.to_normalised(light.position)) /
-          scene.normalisation.scale();
+      looked_at += survey->triangles;
+      const Vec3d point = scene.normalisation.to_normalised(light.position);
+      const double distance = looked_at > kMostDistances
+                                  ? 0
+                                  : nearest_surface(scene, point) / scene.normalisation.scale();
       irradiance = intensity / (distance * distance);
     }
     kind.max_irradiance_over_pi += irradiance / kPi;

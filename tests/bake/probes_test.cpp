@@ -333,6 +333,23 @@ TEST(Probes, CancelEndsABakeUnderWay) {
   EXPECT_LE(updates, 7);
 }
 
+// A lamp of 2 cm in a room of 2 m, met by chance alone, is the heavy tail that an estimate of
+// variance cannot see; with shadow rays that look for it there is none.
+TEST(Probes, HeavyTailsAreSuspicious) {
+  SceneData data = room(0.5f, 0);
+  data.parts.push_back(
+      {make_quad({-0.01f, 0.9f, -0.01f}, {0.02f, 0, 0}, {0, 0, 0.02f}), grey(0, 1000), {}});
+  LitScene lit(data, {}, bounces(1));
+  const CubeTexels texels = all_texels(4);
+  Progress progress;
+  for (const bool sampled : {true, false}) {
+    lit.prepare(bounces(1), [&](EffectSelection& s) { s.emissive_sampling = sampled; });
+    CubeSampling sampling(*lit.radiance, texels, {0, -0.2f, 0}, 5, 0, 1);
+    while (sampling.samples() < 1024) sampling.advance(progress, 0, 1);
+    EXPECT_EQ(sampling.suspicious(), !sampled);
+  }
+}
+
 // 95 % half-widths of texels against a truth of 64 times the samples.
 TEST(Probes, ErrorBarsCoverTheTruth) {
   const LitScene lit(colored_room(), {}, bounces(3));

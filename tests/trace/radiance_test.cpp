@@ -252,6 +252,26 @@ TEST(Radiance, TexturedLampEmitsItsTrueTexels) {
   EXPECT_NEAR(seen.mean.y, quarter * (1 + kGrey), 3 * seen.half_width + 1e-4);
 }
 
+// Holes neither shine nor block: half of the lamp is cut away, its light with it.
+TEST(Radiance, MaskedLampShinesWhereItIs) {
+  const double quarter = 0.5 * 10 * corner_form_factor(0.5, 0.5);
+  Material lamp = grey(0, 10);
+  lamp.alpha_mode = AlphaMode::mask;
+  lamp.base_color_texture.texture = 0;
+  SceneData data;
+  data.parts.push_back({make_floor(20), grey(0.5f), {}});
+  data.parts.push_back({make_quad({-1, 2, -1}, {2, 0, 0}, {0, 0, 2}), lamp, {}});
+  data.textures.push_back(checker());
+  for (size_t texel : {0u, 2u}) data.textures[0].rgba[4 * texel + 3] = 0;
+  for (const bool sampled : {true, false}) {
+    LitScene lit(data, {}, bounces(1));
+    lit.prepare(bounces(1), [&](EffectSelection& s) { s.emissive_sampling = sampled; });
+    const Estimate seen = estimate(lit, lit.ray({0, 1, 9}, {0, -1, -9}), 1024);
+    EXPECT_NEAR(seen.mean.x, 2 * quarter, 2 * seen.half_width + 1e-4);
+    EXPECT_LE(seen.half_width, 0.06 * quarter);
+  }
+}
+
 TEST(Radiance, UnlitSurfacesShowTheirColorAndTakeTheLight) {
   Material unlit = diffuse({0.3f, 0.6f, 0.9f}, {5, 5, 5});
   unlit.unlit = true;
