@@ -7,7 +7,6 @@
 #include <cmath>
 #include <mutex>
 
-#include "core/base/error.h"
 #include "core/base/parallel.h"
 #include "core/sphere/direction_map.h"
 #include "core/sphere/solid_angle.h"
@@ -49,7 +48,8 @@ int response_count(double alpha) {
 // max_{l >= L} |h_l| for every L.
 std::vector<double> response_tails(const std::vector<double>& responses) {
   std::vector<double> tails = responses;
-  double largest = 0;
+  // Beyond the kink's reach odd bands vanish: the last one says nothing of what follows it.
+  double largest = std::abs(responses[responses.size() - 2]);
   for (size_t l = tails.size(); l-- > 0;) {
     largest = std::max(largest, std::abs(responses[l]));
     tails[l] = largest;
@@ -81,10 +81,8 @@ BandChoice choose_bands(const LightStatistics& light, const std::vector<double>&
   if (all > 0 && (light.bright.empty() || all <= rest + rest / 2 + 48)) {
     return {all, false};
   }
-  if (rest > 0) return {rest, true};
-  throw Error(ErrorCode::unsupported, "A prefiltered level of this roughness needs more than " +
-                                          std::to_string(kMaxBands) +
-                                          " bands; roughness 0 or at least 0.08 is allowed.");
+  if (rest > 0) return {rest, !light.bright.empty()};
+  return {static_cast<int>(tails.size()) - 1, !light.bright.empty()};
 }
 
 // The angle between unit vectors with cosine c, to 2e-8: Abramowitz & Stegun 4.4.46,
@@ -130,10 +128,13 @@ struct PointSource {
 };
 
 // A texel acts as a point on bands l while l times its extent is small; larger ones are cut into
-// this many a side.
+// this many a side, as long as the points stay few.
+constexpr double kMaxPoints = 384;
+constexpr double kPointPhase = 0.2;
 int point_cuts(const LightStatistics& light, int bands) {
-  const double extent = light.bright.front().extent_rad;
-  return std::clamp(static_cast<int>(std::ceil(extent * bands / 0.4)), 1, 4);
+  const double most = std::sqrt(kMaxPoints / static_cast<double>(light.bright.size()));
+  const double wanted = std::ceil(light.bright.front().extent_rad * bands / kPointPhase);
+  return static_cast<int>(std::clamp(wanted, 1.0, std::max(1.0, std::floor(most))));
 }
 std::vector<PointSource> bright_points(const LightStatistics& light, int bands) {
   std::vector<PointSource> points;
@@ -188,18 +189,24 @@ double interpolation_bound(const LightStatistics& light, const std::vector<doubl
 }
 
 // Bright texels stand as points of extent s: band l of a box differs from a point's by at most
-// (l s)^2 / 24. Taken as if all their energy E were one source, whose squared norm in band l is
-// E^2 (2l+1) / (4 pi); beyond the computed bands h_l falls as l^-2.5.
+// min(1, (l s)^2 / 24) of it. Taken as if all their energy E were one source, whose squared norm in
+// band l is E^2 (2l+1) / (4 pi). Beyond the computed bands only even ones are left, which fall as
+// l^-2.5; past sixteen times as many, the sum's rest is an integral.
 double point_bound(const LightStatistics& light, const std::vector<double>& responses, int bands) {
   const double extent = light.bright.front().extent_rad / point_cuts(light, bands);
+  const auto term = [&](double l, double response) {
+    const double miss = std::min(1.0, l * l * extent * extent / 24) * response;
+    return (2 * l + 1) * miss * miss;
+  };
   double sum = 0;
   for (size_t l = static_cast<size_t>(bands); l < responses.size(); ++l) {
-    const double phase = static_cast<double>(l) * extent;
-    const double miss = std::min(1.0, phase * phase / 24) * responses[l];
-    sum += (2 * static_cast<double>(l) + 1) * miss * miss;
+    sum += term(static_cast<double>(l), responses[l]);
   }
-  const double last = static_cast<double>(responses.size());
-  sum += 2 * responses.back() * responses.back() * last * last / 3;
+  const double count = static_cast<double>(responses.size());
+  const double last = std::max(std::abs(responses.back()), std::abs(responses.end()[-2]));
+  double l = count;
+  for (; l < 16 * count; l += 2) sum += term(l, last * std::pow(l / count, -2.5));
+  sum += last * last * std::pow(l / count, -5) * l * l / 3;
   return light.bright_share * std::sqrt(sum);
 }
 
@@ -265,14 +272,14 @@ LobePlan plan_lobe(const LightStatistics& light, double alpha, double target) {
   const std::vector<double> responses = ggx_band_responses(lobe, response_count(alpha));
   const std::vector<double> tails = response_tails(responses);
   BandChoice choice = choose_bands(light, tails, target);
-  const auto total_bound = [&] {
-    const double cut = tails[static_cast<size_t>(choice.bands)] *
-                       (choice.corrected ? light.rest_spread : light.spread);
+  const auto total_bound = [&](bool corrected) {
+    const double cut =
+        tails[static_cast<size_t>(choice.bands)] * (corrected ? light.rest_spread : light.spread);
     return cut + interpolation_bound(light, responses, choice.bands) +
-           (choice.corrected ? point_bound(light, responses, choice.bands) : 0.0);
+           (corrected ? point_bound(light, responses, choice.bands) : 0.0);
   };
   const int most = static_cast<int>(responses.size()) - 1;
-  while (total_bound() > target && choice.bands < most) {
+  while (total_bound(choice.corrected) > target && choice.bands < most) {
     choice.bands = std::min(most, choice.bands + choice.bands / 8 + 1);
   }
   LobePlan plan;
@@ -280,8 +287,8 @@ LobePlan plan_lobe(const LightStatistics& light, double alpha, double target) {
   plan.bands = choice.bands;
   plan.corrected = choice.corrected;
   plan.responses.assign(responses.begin(), responses.begin() + choice.bands);
-  plan.error_bound = total_bound();
-  if (plan.corrected) plan.table = cut_table(lobe, plan.responses);
+  plan.error_bound = total_bound(choice.corrected);
+  plan.uncorrected_bound = total_bound(false);
   return plan;
 }
 
@@ -304,6 +311,8 @@ Image convolve_lobe(const LightStatistics& light, const LatlongSpectrum& spectru
                     RangeReport* range) {
   const RingGrid grid = synthesise_rings(spectrum, lobe.responses, rings_for(lobe.bands),
                                          longitudes_for(lobe.bands), threads, progress);
+  const std::vector<double> table =
+      lobe.corrected ? cut_table(GgxLobe(lobe.alpha), lobe.responses) : std::vector<double>{};
   const std::vector<PointSource> points =
       lobe.corrected ? bright_points(light, lobe.bands) : std::vector<PointSource>{};
   Image cube(face_size, 6 * face_size, 3);
@@ -318,7 +327,7 @@ Image convolve_lobe(const LightStatistics& light, const LatlongSpectrum& spectru
             const Vec3d direction =
                 cube_texel_direction(line / face_size, x, line % face_size, face_size);
             Vec3d value = grid.interpolate(direction);
-            if (lobe.corrected) value += cut_light(lobe.table, points, direction);
+            if (lobe.corrected) value += cut_light(table, points, direction);
             double most = 0;
             for (int c = 0; c < 3; ++c) {
               const double inside =

@@ -45,12 +45,12 @@ struct LobePlan {
   int bands = 0;                  // of the map that enter
   bool corrected = false;         // bright texels get what the band limit cuts off, in closed form
   std::vector<double> responses;  // h_l for l < bands
-  std::vector<double> table;      // corrected: lobe minus its band-limited part, over the angle
   double error_bound = 0;         // rms over the sphere, relative to the mean
+  double uncorrected_bound = 0;   // what it would be without the correction
 };
-// The fewest bands whose bound stays at or under `target` (relative rms). Throws Error{unsupported}
-// when more than kMaxBands are needed: alpha under about 0.005.
-inline constexpr int kMaxBands = 2048;
+// The fewest bands whose bound stays at or under `target` (relative rms). Where no allowed number
+// does, the most are taken, and error_bound, then above `target`, says what that gives.
+inline constexpr int kMaxBands = 1400;
 LobePlan plan_lobe(const LightStatistics& light, double alpha, double target);
 
 // The map's coefficients for all `lobes` and for `sh_bands` bands at full accuracy.

@@ -81,7 +81,10 @@ Vec3d irradiance(const Image& latlong, const Vec3d& normal) {
   for (int y = 0; y < latlong.height; ++y) {
     for (int x = 0; x < latlong.width; ++x) {
       const Vec3d radiance = to_double(latlong.rgb(x, y));
-      visit_cells(latlong, x, y, 2, [&](const Vec3d& direction, double omega) {
+      const double above =
+          dot(latlong_direction((x + 0.5) / latlong.width, (y + 0.5) / latlong.height), normal);
+      const int cuts = std::abs(above) < kPi / latlong.height ? 32 : 4;
+      visit_cells(latlong, x, y, cuts, [&](const Vec3d& direction, double omega) {
         sum += radiance * (std::max(0.0, dot(direction, normal)) * omega);
       });
     }
@@ -138,6 +141,7 @@ Dfg dfg(double alpha, double cosine, int steps) {
 Image test_sky(int height, double sun_radiance) {
   Image sky(2 * height, height, 3);
   const Vec3d sun = normalize(Vec3d{0.5, 0.4, -0.7});
+  const double reach = std::cos(std::max(0.01, 0.8 * kPi / height));  // at least one texel
   uint32_t state = 1;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < sky.width; ++x) {
@@ -148,7 +152,7 @@ Image test_sky(int height, double sun_radiance) {
       p[0] = static_cast<float>(0.5 + 0.4 * d.y + 0.2 * d.x + noise);
       p[1] = static_cast<float>(0.6 + 0.3 * d.y * d.z + noise);
       p[2] = static_cast<float>(d.y > 0 ? 1.2 + noise : 0.1 + noise);
-      if (dot(d, sun) > std::cos(0.01)) {
+      if (dot(d, sun) > reach) {
         for (int c = 0; c < 3; ++c) p[c] = static_cast<float>(sun_radiance * (1 - 0.1 * c));
       }
     }
