@@ -78,7 +78,7 @@ OpennessBatch estimate_vertices(const AoState& state, const OpennessKernel& kern
         }
         std::vector<OpennessElement> elements(end - begin);
         for (size_t i = 0; i < elements.size(); ++i)
-          elements[i] = {ids[begin + i],
+          elements[i] = {state.facets->representative(ids[begin + i]),
                          std::span(facets).subspan(first[i], first[i + 1] - first[i])};
         const size_t block = begin / kBlock;
         kernel.estimate(elements, std::span(batch.estimates).subspan(begin, end - begin),

@@ -1,7 +1,11 @@
 #include "core/bake/vertex_facets.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+
+#include "core/base/random.h"
 
 namespace lightkiln {
 
@@ -75,37 +79,92 @@ bool make_facet(const SurfaceMesh& mesh, const std::array<uint32_t, 3>& triangle
   return facet->weight > 0;
 }
 
+namespace {
+
+// Position and normal as bits, with -0 taken for +0.
+using PlaceKey = std::array<uint32_t, 6>;
+PlaceKey place_key(const SurfaceMesh& mesh, size_t vertex) {
+  PlaceKey key;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto at = static_cast<size_t>(axis);
+    key[at] = std::bit_cast<uint32_t>(mesh.positions[vertex][axis] + 0.0f);
+    key[at + 3] = std::bit_cast<uint32_t>(mesh.normals[vertex][axis] + 0.0f);
+  }
+  return key;
+}
+
+uint64_t hash_key(const PlaceKey& key) {
+  uint64_t hash = 0;
+  for (size_t i = 0; i < 6; i += 2) hash = hash_combine(hash, uint64_t{key[i]} << 32 | key[i + 1]);
+  return hash;
+}
+
+// For every vertex of the scene the first one with the same key: an open-addressing table at most
+// half full.
+std::vector<uint64_t> find_representatives(const Scene& scene, uint64_t vertices) {
+  constexpr uint64_t kEmpty = ~uint64_t{0};
+  std::vector<uint64_t> table(std::bit_ceil(2 * vertices + 1), kEmpty);
+  const uint64_t mask = table.size() - 1;
+  std::vector<PlaceKey> keys;
+  keys.reserve(vertices);
+  std::vector<uint64_t> representatives;
+  representatives.reserve(vertices);
+  for (const SurfaceMesh& mesh : scene.meshes)
+    for (size_t v = 0; v < mesh.positions.size(); ++v) {
+      const uint64_t index = keys.size();
+      keys.push_back(place_key(mesh, v));
+      uint64_t slot = hash_key(keys.back()) & mask;
+      while (table[slot] != kEmpty && keys[table[slot]] != keys.back()) slot = (slot + 1) & mask;
+      if (table[slot] == kEmpty) table[slot] = index;
+      representatives.push_back(table[slot]);
+    }
+  return representatives;
+}
+
+}  // namespace
+
 VertexFacets::VertexFacets(const Scene& scene) : scene_(&scene) {
   first_vertex_.push_back(0);
-  for (const SurfaceMesh& mesh : scene.meshes)
+  first_triangle_.push_back(0);
+  for (const SurfaceMesh& mesh : scene.meshes) {
     first_vertex_.push_back(first_vertex_.back() + mesh.positions.size());
+    first_triangle_.push_back(first_triangle_.back() + mesh.triangles.size());
+  }
+  representative_ = find_representatives(scene, vertices());
   begin_.assign(vertices() + 1, 0);
   const auto each_corner = [&](const auto& body) {
     for (size_t m = 0; m < scene.meshes.size(); ++m) {
       const auto& triangles = scene.meshes[m].triangles;
       for (size_t t = 0; t < triangles.size(); ++t)
-        for (size_t c = 0; c < 3; ++c) body(first_vertex_[m] + triangles[t][c], 3 * t + c);
+        for (size_t c = 0; c < 3; ++c)
+          body(representative_[first_vertex_[m] + triangles[t][c]],
+               3 * (first_triangle_[m] + t) + c);
     }
   };
   each_corner([&](uint64_t vertex, uint64_t) { ++begin_[vertex + 1]; });
-  for (size_t v = 0; v + 1 < begin_.size(); ++v) {
-    unused_ += begin_[v + 1] == 0;
-    begin_[v + 1] += begin_[v];
-  }
+  for (const uint64_t vertex : representative_) unused_ += begin_[vertex + 1] == 0;
+  for (size_t v = 0; v + 1 < begin_.size(); ++v) begin_[v + 1] += begin_[v];
   corners_.resize(begin_.back());
   std::vector<uint64_t> next(begin_.begin(), begin_.end() - 1);
   each_corner([&](uint64_t vertex, uint64_t corner) { corners_[next[vertex]++] = corner; });
 }
 
+size_t VertexFacets::mesh_of(uint64_t index, const std::vector<uint64_t>& first) const {
+  return static_cast<size_t>(std::upper_bound(first.begin(), first.end(), index) - first.begin()) -
+         1;
+}
+
 void VertexFacets::facets(uint64_t vertex, std::vector<Facet>* out) const {
-  const auto after = std::upper_bound(first_vertex_.begin(), first_vertex_.end(), vertex);
-  const auto m = static_cast<size_t>(after - first_vertex_.begin()) - 1;
-  const SurfaceMesh& mesh = scene_->meshes[m];
-  const Vec3& toward = mesh.normals[vertex - first_vertex_[m]];
-  for (uint64_t i = begin_[vertex]; i < begin_[vertex + 1]; ++i) {
+  const uint64_t v = representative_[vertex];
+  const size_t home = mesh_of(v, first_vertex_);
+  const Vec3& toward = scene_->meshes[home].normals[v - first_vertex_[home]];
+  for (uint64_t i = begin_[v]; i < begin_[v + 1]; ++i) {
+    const uint64_t triangle = corners_[i] / 3;
+    const size_t m = mesh_of(triangle, first_triangle_);
+    const SurfaceMesh& mesh = scene_->meshes[m];
     Facet facet;
-    const auto& triangle = mesh.triangles[corners_[i] / 3];
-    if (make_facet(mesh, triangle, static_cast<int>(corners_[i] % 3), toward, &facet))
+    if (make_facet(mesh, mesh.triangles[triangle - first_triangle_[m]],
+                   static_cast<int>(corners_[i] % 3), toward, &facet))
       out->push_back(facet);
   }
 }

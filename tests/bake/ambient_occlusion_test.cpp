@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <map>
 
 #include <gtest/gtest.h>
 
@@ -192,6 +193,31 @@ TEST(AmbientOcclusion, DoubledFacesChangeNoByte) {  // G13
   const auto once = doubled.triangles;
   doubled.triangles.insert(doubled.triangles.end(), once.begin(), once.end());
   EXPECT_EQ(bake(doubled, order()).bytes, bake(still_life(), order()).bytes);
+}
+
+TEST(AmbientOcclusion, VerticesSplitAlongASeamGetOneValue) {
+  // Every triangle with corners of its own, as if each were a texture island.
+  const MeshData whole = merged(test::make_grid(4, 12), make_sphere({0, 1, 0}, 1, 12, 24));
+  MeshData split;
+  for (const auto& t : whole.triangles) {
+    const auto first = static_cast<uint32_t>(split.positions.size());
+    for (const uint32_t corner : t) {
+      split.positions.push_back(whole.positions[corner]);
+      split.normals.push_back(whole.normals[corner]);
+      split.texcoords.push_back({static_cast<float>(first), 0});
+    }
+    split.triangles.push_back({first, first + 1, first + 2});
+  }
+  const Baked baked = bake(split, order());
+  std::map<uint32_t, std::pair<float, float>> seen;
+  size_t corner = 0;
+  for (const auto& t : whole.triangles)
+    for (const uint32_t vertex : t) {
+      const std::pair value{baked.openness[corner], baked.errors[corner]};
+      ++corner;
+      EXPECT_EQ(seen.emplace(vertex, value).first->second, value);
+    }
+  EXPECT_EQ(seen.size(), whole.positions.size());
 }
 
 TEST(AmbientOcclusion, VerticesOfNoTriangleAreOpenAndCounted) {
