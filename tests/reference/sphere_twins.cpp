@@ -23,6 +23,20 @@ void visit_cells(const Image& map, int x, int y, int cuts, const Body& body) {
   }
 }
 
+// Visits four Gauss points of each cell: the error falls with the fourth power of the cell.
+template <typename Body>
+void visit_points(const Image& map, int x, int y, int cuts, const Body& body) {
+  const double place[2] = {0.5 - 0.5 / std::sqrt(3.0), 0.5 + 0.5 / std::sqrt(3.0)};
+  for (int j = 0; j < 2 * cuts; ++j) {
+    const double v = (y + (j / 2 + place[j % 2]) / cuts) / map.height;
+    const double omega =
+        2 * kPi / map.width * kPi / map.height * std::sin(kPi * v) / (4.0 * cuts * cuts);
+    for (int i = 0; i < 2 * cuts; ++i) {
+      body(latlong_direction((x + (i / 2 + place[i % 2]) / cuts) / map.width, v), omega);
+    }
+  }
+}
+
 }  // namespace
 
 ShRgb project(const Image& latlong, int bands, int cuts) {
@@ -64,9 +78,9 @@ Vec3d prefilter(const Image& latlong, double alpha, const Vec3d& axis) {
       const bool horizon = std::abs(angle - kPi / 2) < texel;
       const double width = std::max(alpha, angle);
       const int cuts =
-          horizon ? 4 : std::clamp(static_cast<int>(std::ceil(150 * texel / width)), 1, 24);
+          horizon ? 8 : std::clamp(static_cast<int>(std::ceil(6 * texel / width)), 1, 24);
       const Vec3d radiance = to_double(latlong.rgb(x, y));
-      visit_cells(latlong, x, y, cuts, [&](const Vec3d& direction, double omega) {
+      visit_points(latlong, x, y, cuts, [&](const Vec3d& direction, double omega) {
         const double lobe = ggx_lobe(alpha, dot(direction, axis)) * omega;
         sum += radiance * lobe;
         weight += lobe;

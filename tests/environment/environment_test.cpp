@@ -1,0 +1,136 @@
+#include "core/environment/environment.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "core/base/error.h"
+#include "core/image/decode.h"
+#include "core/sphere/direction_map.h"
+#include "core/sphere/solid_angle.h"
+#include "tests/reference/sphere_twins.h"
+#include "tests/support/data.h"
+
+namespace lightkiln {
+namespace {
+
+DecodedImage decoded(const Image& image, EnvmapAttribute envmap = EnvmapAttribute::none) {
+  DecodedImage result;
+  result.image = image;
+  result.envmap = envmap;
+  return result;
+}
+
+TEST(Environment, CountsNanInfiniteAndNegativeByKind) {
+  Image dirty = reference::test_sky(16, 10), clean = dirty;
+  const float bad[] = {NAN, NAN, INFINITY, -INFINITY, -1.0f, -0.5f, -2.0f};
+  for (int i = 0; i < 7; ++i) {
+    dirty.at(i, 5)[i % 3] = bad[i];
+    clean.at(i, 5)[i % 3] = 0;
+  }
+  const Environment a = make_environment(decoded(dirty)), b = make_environment(decoded(clean));
+  EXPECT_EQ(a.repairs.nan, 2u);
+  EXPECT_EQ(a.repairs.infinite, 2u);
+  EXPECT_EQ(a.repairs.negative, 3u);
+  EXPECT_EQ(a.radiance.pixels, b.radiance.pixels);
+  EXPECT_EQ(a.mean, b.mean);
+  EXPECT_TRUE(std::isfinite(a.mean.x));
+}
+
+TEST(Environment, KnowsAConstantMapAndItsMean) {
+  Image map(8, 4, 3);
+  for (float& v : map.pixels) v = 0.7f;
+  const Environment environment = make_environment(decoded(map));
+  EXPECT_TRUE(environment.constant);
+  EXPECT_EQ(environment.mean.y, double(0.7f));
+  map.at(5, 2)[0] = 0.8f;
+  EXPECT_FALSE(make_environment(decoded(map)).constant);
+}
+
+TEST(Environment, MeansWithTrueSolidAngles) {
+  Image map(64, 32, 3);
+  for (int x = 0; x < 64; ++x) map.at(x, 0)[0] = 100;  // a bright pole row
+  const Environment environment = make_environment(decoded(map));
+  EXPECT_NEAR(environment.mean.x, 100 * cap_solid_angle(kPi / 32) / (4 * kPi), 1e-12);
+  EXPECT_GT(100.0 / 32, 10 * environment.mean.x);  // what counting texels alike would give
+}
+
+TEST(Environment, TakesOneChannelAsGrey) {
+  Image grey(4, 2, 1);
+  grey.at(1, 1)[0] = 3;
+  const Environment environment = make_environment(decoded(grey));
+  EXPECT_EQ(environment.radiance.rgb(1, 1), (Vec3{3, 3, 3}));
+}
+
+TEST(Environment, RefusesCubesAndPhotographsBySentence) {
+  for (const auto& image : {decoded(Image(16, 96, 3), EnvmapAttribute::cube),
+                            decoded(Image(300, 200, 3)), decoded(Image(2, 2, 3))}) {
+    try {
+      make_environment(image);
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::invalid_input);
+      EXPECT_NE(std::string(error.what()).find("twice as wide"), std::string::npos);
+    }
+  }
+}
+
+TEST(Environment, LooksUpTheTexelThatHoldsADirection) {
+  Image map(8, 4, 3);
+  for (size_t i = 0; i < map.pixels.size(); ++i) map.pixels[i] = float(i);
+  const Environment environment = make_environment(decoded(map));
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 8; ++x) {
+      for (const double f : {0.001, 0.5, 0.999}) {
+        const Vec3d d = latlong_direction((x + f) / 8, (y + f) / 4);
+        EXPECT_EQ(environment_radiance(environment, to_float(d)), map.rgb(x, y));
+      }
+    }
+  }
+  EXPECT_EQ(environment_radiance(environment, {0, 1, 0}).x, map.rgb(4, 0).x);
+  EXPECT_EQ(environment_radiance(constant_environment({1, 2, 3}), {0, -1, 0}), (Vec3{1, 2, 3}));
+}
+
+// A file that says envmap = latlong has its outer pixel centres on the borders. A linear ramp in
+// latitude and a bump in longitude keep their place only when that is heeded.
+TEST(Environment, HeedsTexelsOnTheBorder) {
+  Image map(64, 32, 3);
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      map.at(x, y)[0] = static_cast<float>(y / 31.0);
+      map.at(x, y)[1] = static_cast<float>(1 + std::cos(2 * kPi * x / 63.0));
+    }
+  }
+  const Environment heeded = make_environment(decoded(map, EnvmapAttribute::latlong));
+  const Environment ignored = make_environment(decoded(map));
+  double worst = 0, worst_ignored = 0;
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      const double v = (y + 0.5) / 32, u = (x + 0.5) / 64;
+      const Vec3 a = heeded.radiance.rgb(x, y), b = ignored.radiance.rgb(x, y);
+      worst = std::max({worst, std::abs(a.x - v), std::abs(a.y - 1 - std::cos(2 * kPi * u))});
+      worst_ignored =
+          std::max({worst_ignored, std::abs(b.x - v), std::abs(b.y - 1 - std::cos(2 * kPi * u))});
+    }
+  }
+  EXPECT_LT(worst, 2e-3);
+  EXPECT_GT(worst_ignored, 1e-2);
+}
+
+TEST(Environment, OpensEveryLatLongOfTheDataSet) {
+  LIGHTKILN_NEEDS_DATA(data);
+  int opened = 0;
+  for (const char* folder : {"latlong_hdr", "latlong_exr", "furnace"}) {
+    for (const auto& entry : std::filesystem::directory_iterator(data / "environments" / folder)) {
+      const Environment environment =
+          make_environment(decode_hdr_image(test::read_file(entry.path())));
+      EXPECT_GT(luminance(environment.mean), 0) << entry.path();
+      EXPECT_EQ(environment.constant, std::string(folder) == "furnace") << entry.path();
+      ++opened;
+    }
+  }
+  EXPECT_EQ(opened, 13);
+}
+
+}  // namespace
+}  // namespace lightkiln

@@ -1,0 +1,346 @@
+#include "core/environment/prefilter.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "core/environment/dfg.h"
+#include "core/environment/resample.h"
+#include "core/image/decode.h"
+#include "core/sphere/direction_map.h"
+#include "core/sphere/quadrature.h"
+#include "core/sphere/solid_angle.h"
+#include "tests/reference/sphere_twins.h"
+#include "tests/support/data.h"
+
+namespace lightkiln {
+namespace {
+
+Environment environment_of(const Image& image) {
+  DecodedImage decoded;
+  decoded.image = image;
+  return make_environment(decoded);
+}
+
+struct Level {
+  LobePlan lobe;
+  Image cube;
+  RangeReport range;
+};
+Level prefilter(const Environment& environment, double alpha, int size, double target,
+                bool correct = true) {
+  Progress progress;
+  const LightStatistics light = measure_light(environment);
+  Level level{plan_lobe(light, alpha, target), {}, {}};
+  if (!correct) level.lobe.corrected = false;
+  const LatlongSpectrum spectrum = project_for(environment, {&level.lobe, 1}, 1, 2, progress);
+  level.cube = convolve_lobe(light, spectrum, level.lobe, size, 2, progress, &level.range);
+  return level;
+}
+
+TEST(GgxLobe, IsTheCosineAtFullRoughness) {
+  const GgxLobe lobe(1);
+  for (const double c : {-0.5, 0.0, 0.1, 0.7, 1.0}) {
+    EXPECT_NEAR(lobe(c), std::max(c, 0.0) / kPi, 1e-15);
+  }
+  const std::vector<double> responses = ggx_band_responses(lobe, 20);
+  for (int l = 0; l < 20; ++l) {
+    EXPECT_NEAR(responses[static_cast<size_t>(l)], clamped_cosine_band(l) / kPi, 1e-12);
+  }
+}
+
+TEST(GgxLobe, HasThePublishedBandResponses) {
+  const double expected[][3] = {
+      {0.5, 0.763561, 0.436024}, {0.25, 0.867396, 0.662406}, {1.0 / 16, 0.976093, 0.933738}};
+  for (const auto& row : expected) {
+    const std::vector<double> responses = ggx_band_responses(GgxLobe(row[0]), 600);
+    EXPECT_NEAR(responses[0], 1, 1e-11);
+    EXPECT_NEAR(responses[1], row[1], 1e-6);
+    EXPECT_NEAR(responses[2], row[2], 1e-6);
+  }
+  // The spectrum of a narrow lobe: x K_1(x), x = 2 alpha l.
+  const std::vector<double> narrow = ggx_band_responses(GgxLobe(0.04), 201);
+  EXPECT_NEAR(narrow[64], 1.8e-2, 1e-3);
+  EXPECT_NEAR(narrow[128], 1.5e-4, 1e-5);
+}
+
+TEST(GgxLobe, EqualsTheDistributionOfHalfVectors) {
+  for (const double alpha : {1e-3, 0.002025, 0.1, 0.5, 0.97, 1.0}) {
+    const GgxLobe lobe(alpha);
+    const double ratio = lobe(0.5) / reference::ggx_lobe(alpha, 0.5);
+    for (const double angle : {1e-4, 1e-3, 0.03, 0.4, 1.2, 1.5}) {
+      const double c = std::cos(angle);
+      EXPECT_NEAR(lobe.at_angle(angle) / (ratio * reference::ggx_lobe(alpha, c)), 1, 1e-6);
+    }
+    EXPECT_TRUE(std::isfinite(lobe(1)) && lobe(1) > 0);
+  }
+  // In float the usual form of D at its peak is infinite already at roughness 0.01.
+  const float a2 = 1e-4f * 1e-4f, naive = 1.0f * (a2 - 1.0f) + 1.0f;
+  EXPECT_FALSE(std::isfinite(a2 / (naive * naive)));
+}
+
+// L = 1 + a.w has only bands 0 and 1: every level is 1 + h_1 a.n, seams included.
+TEST(Prefilter, ScalesALinearMapByItsFirstResponse) {
+  Image map(256, 128, 3);
+  for (int y = 0; y < 128; ++y) {
+    for (int x = 0; x < 256; ++x) {
+      const Vec3d d = latlong_direction((x + 0.5) / 256, (y + 0.5) / 128);
+      const float v = static_cast<float>(1 + 0.3 * d.x - 0.5 * d.y + 0.2 * d.z);
+      std::fill_n(map.at(x, y), 3, v);
+    }
+  }
+  const Environment environment = environment_of(map);
+  for (const double alpha : {0.0625, 0.25, 1.0}) {
+    const double h1 = ggx_band_responses(GgxLobe(alpha), 600)[1];
+    const Image cube = prefilter(environment, alpha, 16, 1e-5).cube;
+    for (int y = 0; y < 96; ++y) {
+      for (int x = 0; x < 16; ++x) {
+        const Vec3d d = cube_texel_direction(y / 16, x, y % 16, 16);
+        ASSERT_NEAR(cube.rgb(x, y).x, 1 + h1 * (0.3 * d.x - 0.5 * d.y + 0.2 * d.z), 1e-4);
+      }
+    }
+  }
+}
+
+struct Difference {
+  double rms = 0, worst_relative = 0;
+};
+Difference against_brute_force(const Environment& environment, const Level& level, int size,
+                               int samples) {
+  Difference difference;
+  for (int i = 0; i < samples; ++i) {
+    const int texel = (i * 7919 + 13) % (6 * size * size);
+    const int x = texel % size, y = texel / size;
+    const Vec3d d = cube_texel_direction(y / size, x, y % size, size);
+    const Vec3d truth = reference::prefilter(environment.radiance, level.lobe.alpha, d);
+    const Vec3d error = to_double(level.cube.rgb(x, y)) - truth;
+    difference.rms += dot(error, error) / 3;
+    for (int c = 0; c < 3; ++c) {
+      difference.worst_relative =
+          std::max(difference.worst_relative, std::abs(error[c]) / truth[c]);
+    }
+  }
+  difference.rms = std::sqrt(difference.rms / samples) / luminance(environment.mean);
+  return difference;
+}
+
+TEST(Prefilter, EqualsBruteForceUnderASun) {
+  const Environment environment = environment_of(reference::test_sky(128, 1e5));
+  for (const double alpha : {0.0625, 0.25, 0.5625, 1.0}) {
+    const Level level = prefilter(environment, alpha, 32, 1e-4);
+    const Difference difference = against_brute_force(environment, level, 32, 40);
+    EXPECT_LE(level.lobe.error_bound, 1e-4) << alpha;
+    EXPECT_LT(difference.rms, 1e-4) << alpha;
+    EXPECT_LT(difference.worst_relative, 1e-3) << alpha;
+    EXPECT_LT(level.range.most, 1e-3) << alpha;
+    for (const float v : level.cube.pixels) ASSERT_GE(v, 0);
+  }
+}
+
+// The positive control: the same bands without the bright texels' closed form ring.
+TEST(Prefilter, WouldRingUnderASunWithoutTheCorrection) {
+  const Environment environment = environment_of(reference::test_sky(128, 1e5));
+  const Level level = prefilter(environment, 0.25, 32, 1e-4, false);
+  EXPECT_GT(level.lobe.uncorrected_bound, 1e-3);
+  EXPECT_GT(against_brute_force(environment, level, 32, 40).rms, 1e-3);
+}
+
+TEST(Prefilter, EqualsBruteForceOnKloppenheim) {
+  LIGHTKILN_NEEDS_DATA(data);
+  const Environment environment = make_environment(decode_hdr_image(
+      test::read_file(data / "environments" / "latlong_hdr" / "kloppenheim_05_1k.hdr")));
+  for (const double alpha : {0.0625, 0.5625}) {
+    const Level level = prefilter(environment, alpha, 32, 1e-4);
+    const Difference difference = against_brute_force(environment, level, 32, 6);
+    EXPECT_LT(difference.rms, 1e-4) << alpha;
+    EXPECT_LT(difference.worst_relative, 1e-3) << alpha;
+  }
+}
+
+// The same function with every texel cut into four gives the same level: bright texels are other
+// ones then, and band limits may differ.
+TEST(Prefilter, DoesNotDependOnTheInputsResolution) {
+  const Image coarse = reference::test_sky(64, 1e5);
+  Image fine(256, 128, 3);
+  for (int y = 0; y < 128; ++y) {
+    for (int x = 0; x < 256; ++x) std::copy_n(coarse.at(x / 2, y / 2), 3, fine.at(x, y));
+  }
+  const Environment a = environment_of(fine), b = environment_of(coarse);
+  for (const double alpha : {0.25, 0.5625}) {
+    const Image large = prefilter(a, alpha, 16, 1e-4).cube;
+    const Image small = prefilter(b, alpha, 16, 1e-4).cube;
+    for (size_t i = 0; i < large.pixels.size(); ++i) {
+      ASSERT_NEAR(small.pixels[i], large.pixels[i], 5e-4 * luminance(a.mean));
+    }
+  }
+}
+
+// Neighbours across an edge differ no more than neighbours inside: filtering is by direction.
+TEST(Prefilter, ShowsNoSeamAtCubeEdges) {
+  const Environment environment = environment_of(reference::test_sky(64, 10));
+  const int size = 16;
+  const Image cube = prefilter(environment, 0.5625, size, 1e-4).cube;
+  double inside = 0, across = 0;
+  for (int y = 0; y < 6 * size; ++y) {
+    for (int x = 0; x + 1 < size; ++x) {
+      inside = std::max(inside, double(std::abs(cube.rgb(x, y).x - cube.rgb(x + 1, y).x)));
+    }
+  }
+  // The right edge of +X is the left edge of +Z; the top of +Y is that of +Z, turned round.
+  for (int y = 0; y < size; ++y) {
+    across =
+        std::max(across, double(std::abs(cube.rgb(size - 1, y).x - cube.rgb(0, 4 * size + y).x)));
+    across = std::max(
+        across, double(std::abs(cube.rgb(y, 2 * size).x - cube.rgb(size - 1 - y, 4 * size).x)));
+  }
+  const Vec3d right = cube_texel_direction(0, size - 1, 8, size);
+  const Vec3d left = cube_texel_direction(4, 0, 8, size);
+  EXPECT_LT(length(right - left), 2.5 / size);
+  EXPECT_LE(across, 1.5 * inside);
+}
+
+TEST(Prefilter, GivesTheSameBitsForAnyNumberOfThreads) {
+  const Environment environment = environment_of(reference::test_sky(32, 1e4));
+  const LightStatistics light = measure_light(environment);
+  const LobePlan lobe = plan_lobe(light, 0.25, 1e-4);
+  std::vector<float> first;
+  for (const int threads : {1, 2, 8}) {
+    Progress progress;
+    const LatlongSpectrum spectrum = project_for(environment, {&lobe, 1}, 1, threads, progress);
+    const Image cube = convolve_lobe(light, spectrum, lobe, 16, threads, progress);
+    if (first.empty()) first = cube.pixels;
+    EXPECT_EQ(cube.pixels, first);
+  }
+}
+
+TEST(Resample, IsTheMeanOverEachCubeTexel) {
+  for (const int height : {8, 33, 128}) {
+    const Image sky = reference::test_sky(height, 100);
+    Progress progress;
+    const int size = 24;
+    const Image cube = resample_to_cube(sky, size, 1, progress);
+    double sum = 0;
+    int count = 0;
+    for (int y = 0; y < 6 * size; y += 3) {
+      for (int x = 1; x < size; x += 4) {
+        const Vec3d truth = reference::cube_texel_mean(sky, y / size, x, y % size, size, 96);
+        const double error = (cube.rgb(x, y).y - truth.y) / truth.y;
+        sum += error * error;
+        ++count;
+      }
+    }
+    EXPECT_LT(std::sqrt(sum / count), kResampleError) << height;
+  }
+}
+
+TEST(Resample, KeepsEnergyAndConstants) {
+  for (const int size : {1, 5, 64}) {
+    const Image sky = reference::test_sky(64, 1e5);
+    Image white(128, 64, 3);
+    for (float& v : white.pixels) v = 1;
+    Progress progress;
+    const Image cube = resample_to_cube(sky, size, 1, progress);
+    const Image one = resample_to_cube(white, size, 1, progress);
+    for (const float v : one.pixels) ASSERT_NEAR(v, 1, 1e-6);
+    double before = 0, after = 0;
+    for (int y = 0; y < 64; ++y) {
+      for (int x = 0; x < 128; ++x) {
+        before += sky.rgb(x, y).x * latlong_texel_solid_angle(y, 128, 64);
+      }
+    }
+    for (int y = 0; y < 6 * size; ++y) {
+      for (int x = 0; x < size; ++x) {
+        after += cube.rgb(x, y).x * cube_texel_solid_angle(x, y % size, size);
+      }
+    }
+    EXPECT_NEAR(after / before, 1, 1e-5) << size;
+  }
+}
+
+// Texels of the cube inside one texel of the map equal it: level 0 is the source.
+TEST(Resample, EqualsTheSourceTexelWhenEnlarging) {
+  const Image sky = reference::test_sky(8, 3);
+  Progress progress;
+  const int size = 128;
+  const Image cube = resample_to_cube(sky, size, 2, progress);
+  int compared = 0;
+  for (int y = 0; y < 6 * size; y += 5) {
+    for (int x = 0; x < size; x += 5) {
+      double u = 0, v = 0;
+      latlong_coordinates(cube_texel_direction(y / size, x, y % size, size), &u, &v);
+      const double fx = u * 16 - std::floor(u * 16), fy = v * 8 - std::floor(v * 8);
+      if (std::min({fx, fy, 1 - fx, 1 - fy}) < 0.2 || v < 0.15 || v > 0.85) continue;
+      const Vec3 source = sky.rgb(static_cast<int>(u * 16), static_cast<int>(v * 8));
+      ASSERT_NEAR(cube.rgb(x, y).x, source.x, 1e-6 * source.x);
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 1000);
+}
+
+TEST(Dfg, HasThePublishedValues) {
+  const double expected[][4] = {
+      {0.0625, 1, .99569, .00000}, {0.0625, 0.5, .95568, .03264}, {0.0625, 0.1, .5055, .3916},
+      {0.25, 1, .91579, .00003},   {0.25, 0.5, .83492, .02235},   {0.25, 0.1, .75192, .13969},
+      {0.5625, 1, .62684, .00005}, {0.5625, 0.5, .65469, .00848}, {0.5625, 0.1, .79577, .05258}};
+  for (const auto& row : expected) {
+    const DfgValue value = ggx_dfg(row[0], row[1]);
+    EXPECT_NEAR(value.scale, row[2], 5e-4);
+    EXPECT_NEAR(value.bias, row[3], 1e-4);
+  }
+}
+
+TEST(Dfg, ReflectsTheClosedFormAtFullRoughness) {
+  double average = 0;
+  const GaussRule rule = gauss_legendre(24);
+  for (size_t i = 0; i < rule.nodes.size(); ++i) {
+    const double mu = 0.5 * (1 + rule.nodes[i]);
+    const DfgValue value = ggx_dfg(1, mu);
+    EXPECT_NEAR(value.scale + value.bias, 1 - mu * std::log1p(1 / mu), 1e-5);
+    average += rule.weights[i] * mu * (value.scale + value.bias);
+  }
+  EXPECT_NEAR(average, 4.0 / 3 * (1 - std::log(2.0)), 1e-5);
+  EXPECT_GT(std::abs(average - 0.376635), 0.03);  // separable Smith
+}
+
+TEST(Dfg, TendsToSchlickForAMirror) {
+  for (const double mu : {0.1, 0.5, 0.9}) {
+    const DfgValue value = ggx_dfg(1e-6, mu);
+    EXPECT_NEAR(value.bias, std::pow(1 - mu, 5), 1e-4);
+    EXPECT_NEAR(value.scale, 1 - std::pow(1 - mu, 5), 1e-4);
+  }
+}
+
+TEST(Dfg, StaysWithinItsBound) {
+  double worst = 0;
+  for (int i = 0; i <= 12; ++i) {
+    for (int j = 0; j <= 12; ++j) {
+      const double alpha = std::pow(10, -7 * i / 12.0), mu = std::pow(2048, -j / 12.0);
+      const DfgValue a = ggx_dfg(alpha, mu), b = ggx_dfg(alpha, mu, 8);
+      worst = std::max({worst, std::abs(a.scale - b.scale), std::abs(a.bias - b.bias)});
+      EXPECT_LE(a.scale + a.bias, 1 + 1e-5);
+      EXPECT_TRUE(std::isfinite(a.scale) && a.scale >= 0 && a.bias >= 0);
+    }
+  }
+  EXPECT_LE(worst, kDfgErrorBound);
+  const DfgValue fast = ggx_dfg(0.3, 0.6);
+  const reference::Dfg slow = reference::dfg(0.3, 0.6, 1500);
+  EXPECT_NEAR(fast.scale, slow.scale, 2e-5);
+  EXPECT_NEAR(fast.bias, slow.bias, 1e-5);
+}
+
+// Dividing by the single-scattering albedo restores a furnace; without it energy is lost.
+TEST(Dfg, CompensatesToAFurnaceOfOne) {
+  for (const double alpha : {0.25, 1.0}) {
+    for (const double mu : {0.1, 0.5, 1.0}) {
+      const DfgValue value = ggx_dfg(alpha, mu);
+      const double single = value.scale + value.bias;
+      const double compensated = single * (1 + 1.0 * (1 / single - 1));
+      EXPECT_NEAR(compensated, 1, 2e-3);
+      EXPECT_LT(single, 1);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lightkiln
