@@ -12,6 +12,29 @@ namespace lightkiln {
 
 namespace {
 
+// What an operator grants to every job; the same for both commands.
+template <typename Config>
+void add_grants(CLI::App& app, Config& config) {
+  app.add_option("--threads", config.threads, "Threads of each worker's oven; 0 = one a processor")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  app.add_option_function<uint64_t>(
+         "--oven-memory-mib",
+         [&config](const uint64_t& mebibytes) { config.oven_memory_bytes = mebibytes << 20; },
+         "Memory that one job may take, in MiB; 0 = no limit")
+      ->check(CLI::Range(uint64_t{0}, uint64_t{1} << 24))
+      ->default_str(std::to_string(config.oven_memory_bytes >> 20));
+  app.add_option("--chunk-seconds", config.chunk_seconds, "Work aimed at per chunk")
+      ->check(CLI::Range(0.001, 3600.0))
+      ->capture_default_str();
+  app.add_option("--task-seconds", config.task_seconds, "Wall time that one task may take")
+      ->check(CLI::Range(1.0, 1e6))
+      ->capture_default_str();
+  app.add_option("--lease-ms", config.lease_ms, "Time after which a silent worker loses its task")
+      ->check(CLI::Range(500, 3600000))
+      ->capture_default_str();
+}
+
 void add_serve(CLI::App& app, ServeConfig& config, std::string& listen, std::string& level) {
   app.add_option("--store", config.store_directory, "Folder of the store; made when absent")
       ->required();
@@ -22,9 +45,7 @@ void add_serve(CLI::App& app, ServeConfig& config, std::string& listen, std::str
   app.add_option("--workers", config.workers, "Worker processes to run; 0 = none")
       ->check(CLI::Range(0, 64))
       ->capture_default_str();
-  app.add_option("--threads", config.threads, "Threads of each worker's oven; 0 = one a processor")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
+  add_grants(app, config);
   app.add_option("--oven", config.oven_path,
                  "The oven program; kiln-oven beside this one if unset");
   app.add_option("--token-file", config.token_file,
@@ -33,9 +54,6 @@ void add_serve(CLI::App& app, ServeConfig& config, std::string& listen, std::str
   app.add_option("--allow-host", config.hosts, "Further name that clients may call this host by");
   app.add_flag("--parent-watch", config.parent_watch, "Stop when the parent process ends");
   app.add_option("--log-level", level, "error, warning, info or debug")->default_str(level);
-  app.add_option("--lease-ms", config.lease_ms, "Time after which a silent worker loses its task")
-      ->check(CLI::Range(500, 3600000))
-      ->capture_default_str();
   app.add_option("--max-connections", config.max_connections, "Open connections in all")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
@@ -48,16 +66,11 @@ void add_serve(CLI::App& app, ServeConfig& config, std::string& listen, std::str
 void add_worker(CLI::App& app, WorkerConfig& config) {
   WorkerOptions& options = config.options;
   app.add_option("--store", options.store_directory, "Folder of the store")->required();
-  app.add_option("--threads", options.threads, "Threads of the oven; 0 = one a processor")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
+  add_grants(app, options);
   app.add_option("--oven", options.oven_path,
                  "The oven program; kiln-oven beside this one if unset");
   app.add_option("--name", options.name, "Name in the store and the log");
   app.add_flag("--exit-when-idle", options.exit_when_idle, "End when there is nothing to do");
-  app.add_option("--lease-ms", options.lease_ms, "Time after which a silent worker loses its task")
-      ->check(CLI::Range(500, 3600000))
-      ->capture_default_str();
   app.add_option("--parent", config.parent_process,
                  "End when the process of this number is no longer the parent");
 }

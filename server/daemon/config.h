@@ -24,6 +24,9 @@ struct ServeConfig {
   bool parent_watch = false;       // stop when the parent process ends
   LogLevel log_level = LogLevel::info;
   int64_t lease_ms = 15000;
+  uint64_t oven_memory_bytes = WorkerOptions().oven_memory_bytes;
+  double chunk_seconds = WorkerOptions().chunk_seconds;
+  double task_seconds = WorkerOptions().task_seconds;
   int max_connections = 256;
   int max_connections_per_address = 32;
   // The program started as `worker`, and the one that workers start as oven.

@@ -59,8 +59,10 @@ std::vector<std::vector<std::string>> worker_commands(const ServeConfig& config)
   for (int i = 0; i < config.workers; ++i)
     commands.push_back({config.worker_program, "worker", "--store", config.store_directory,
                         "--oven", config.oven_path, "--threads", std::to_string(config.threads),
-                        "--lease-ms", std::to_string(config.lease_ms), "--name",
-                        "local-" + std::to_string(i)});
+                        "--oven-memory-mib", std::to_string(config.oven_memory_bytes >> 20),
+                        "--chunk-seconds", std::to_string(config.chunk_seconds), "--task-seconds",
+                        std::to_string(config.task_seconds), "--lease-ms",
+                        std::to_string(config.lease_ms), "--name", "local-" + std::to_string(i)});
   return commands;
 }
 

@@ -82,10 +82,11 @@ void SqliteStore::drop_chunk_bytes(Database& db, const std::string& id,
 
 void SqliteStore::sum_chunks(Database& db, const std::string& id) {
   db.run(
-      "UPDATE jobs SET chunk_fraction=0, version=?3, (chunks_done, error_sum_sq, error_elements) = "
-      "(SELECT count(*), coalesce(sum(error_sum_sq),0), coalesce(sum(elements),0) FROM tasks WHERE "
-      "job_id=?1 AND type=?2 AND state=2) WHERE id=?1",
-      id, static_cast<int>(TaskType::chunk), raise_version(db));
+      "UPDATE jobs SET chunk_fraction=0, version=?3, reason=CASE WHEN EXISTS(SELECT 1 FROM tasks "
+      "WHERE job_id=?1 AND state=1) THEN '' ELSE ?4 END, (chunks_done, error_sum_sq, "
+      "error_elements) = (SELECT count(*), coalesce(sum(error_sum_sq),0), "
+      "coalesce(sum(elements),0) FROM tasks WHERE job_id=?1 AND type=?2 AND state=2) WHERE id=?1",
+      id, static_cast<int>(TaskType::chunk), raise_version(db), kWaitingForWorker);
 }
 
 // A file is removed after the commit that made it an orphan, and still under the lock, so that

@@ -12,7 +12,6 @@ namespace lightkiln {
 namespace {
 
 constexpr int64_t kIdempotencyMs = 7ll * 24 * 3600 * 1000;
-constexpr const char* kWaitingForWorker = "Waiting for a worker.";
 
 #define LIGHTKILN_JOB_COLUMNS                                                               \
   "id, name, kind, spec_digest, priority, plan_only, state, stage, reason, chunks_total, "  \

@@ -19,6 +19,9 @@
 
 namespace lightkiln {
 
+// Why a job that nobody works on does not move.
+inline constexpr const char* kWaitingForWorker = "Waiting for a worker.";
+
 // Milliseconds since boot, suspends included: the only clock that judges leases.
 int64_t lease_clock_ms();
 // Unix milliseconds, for display and for naming jobs.

@@ -182,7 +182,7 @@ void SqliteStore::commit_plan(const Claim& claim, const std::string& plan_json, 
   if (db.number(0, "SELECT plan_only FROM jobs WHERE id=?1", claim.job_id) != 0) {
     move_job(db, claim.job_id, JobEvent::plan_only_committed, "");
   } else {
-    move_job(db, claim.job_id, JobEvent::plan_committed, "");
+    move_job(db, claim.job_id, JobEvent::plan_committed, kWaitingForWorker);
     for (uint64_t index = 0; index < chunks; ++index)
       db.run("INSERT INTO tasks(job_id,type,chunk_index) VALUES(?1,?2,?3)", claim.job_id, kChunk,
              index);
@@ -218,7 +218,7 @@ void SqliteStore::commit_chunk(const Claim& claim, const ChunkCommit& chunk) {
                 .take());
   if (left == 0) {
     db.run("INSERT INTO tasks(job_id,type,chunk_index) VALUES(?1,?2,0)", claim.job_id, kAssemble);
-    move_job(db, claim.job_id, JobEvent::last_chunk_committed, "");
+    move_job(db, claim.job_id, JobEvent::last_chunk_committed, kWaitingForWorker);
   }
   writer.commit();
 }
