@@ -1,7 +1,8 @@
 #pragma once
 
-// glTF 2.0 in and out. The only user of tinygltf, Draco and meshoptimizer. Nothing of the file
-// reaches tinygltf before a pre-flight of our own has checked every count, index and byte range.
+// glTF 2.0 in and out. This floor is the only user of tinygltf, Draco and meshoptimizer. Nothing of
+// the file reaches tinygltf before a pre-flight of our own has checked every count, index and byte
+// range.
 
 #include <cstddef>
 #include <map>
@@ -27,8 +28,9 @@ struct GltfLimits {
 };
 
 struct GltfLoadOptions {
-  bool textures =
-      true;  // false leaves every image undecoded (ambient occlusion needs none without alpha)
+  // False leaves every image undecoded: Scene::textures then hold their settings but no pixels and
+  // a width of 0. Ambient occlusion needs none unless a material has alpha.
+  bool textures = true;
   GltfLimits limits;
 };
 

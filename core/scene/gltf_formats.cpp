@@ -79,12 +79,12 @@ class Checker {
       const GltfAccessor& accessor = file_.accessors[index];
       if (!allowed(name, accessor, quantized_)) {
         refuse("The accessor's type is not allowed for " + name.substr(0, 80) + ".",
-               where + "/" + name);
+               pointer_below(where, name));
       }
       if (accessor.count != count) {
         refuse("The attribute " + name.substr(0, 80) + " has " + std::to_string(accessor.count) +
                    " elements, but the primitive has " + std::to_string(count) + " vertices.",
-               where + "/" + name);
+               pointer_below(where, name));
       }
     }
   }

@@ -108,8 +108,7 @@ std::string to_text(const JsonValue& value) {
 
 // --- Checked reading -----------------------------------------------------------------------------
 
-// RFC 6901: "~" and "/" in keys are written "~0" and "~1".
-static std::string child(const std::string& where, std::string_view key) {
+std::string pointer_below(const std::string& where, std::string_view key) {
   std::string path = where + "/";
   for (const char c : key) {
     if (c == '~') {
@@ -133,7 +132,7 @@ void JsonAt::expect_object() const {
 
 std::optional<JsonAt> JsonAt::find(std::string_view key) const {
   expect_object();
-  if (const JsonValue* member = value_->find(key)) return JsonAt(*member, child(where_, key));
+  if (const JsonValue* member = value_->find(key)) return JsonAt(*member, pointer_below(where_, key));
   return std::nullopt;
 }
 

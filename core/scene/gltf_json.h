@@ -54,6 +54,9 @@ JsonValue json_string(std::string value);
 // Compact text: shortest digits that read back as the same double, members in their order.
 std::string to_text(const JsonValue& value);
 
+// `where` continued by one key, "~" and "/" escaped (RFC 6901).
+std::string pointer_below(const std::string& where, std::string_view key);
+
 // A value and its place (a JSON pointer, RFC 6901). Every getter throws Error{invalid_input} that
 // names the place when the value is of another kind or out of range.
 class JsonAt {

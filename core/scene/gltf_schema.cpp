@@ -228,7 +228,7 @@ class Walk {
   void map(const JsonAt& at, const char* section) {
     at.expect_object();
     for (const JsonMember& member : *at.value().object()) {
-      reference(JsonAt(member.value, at.where() + "/" + member.key), section);
+      reference(JsonAt(member.value, pointer_below(at.where(), member.key)), section);
     }
   }
 
