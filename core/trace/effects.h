@@ -20,6 +20,7 @@
 namespace lightkiln {
 
 inline constexpr int kMostBounces = 64;
+inline constexpr int kMostHalvings = 4;
 inline constexpr double kBoundCeiling = 1e6;
 // A light whose bound is under this share of the ordered error is left out.
 inline constexpr double kNegligibleShare = 0.05;
@@ -44,9 +45,10 @@ struct EffectSelection {
   // A path ends once its throughput is at or under this: what lies behind it is under the same
   // bound as what lies behind max_bounces. 0 = never.
   float throughput_floor = 0;
-  // Paths go on to vertex number halving[0] (the probe sees vertex 0) for half of the samples at
-  // twice the weight, to halving[1] for a quarter at four times: see radiance.h.
-  int halving[2] = {kMostBounces + 1, kMostBounces + 1};
+  // Paths go on to vertex number halving[i] (the probe sees vertex 0) for one in 2^(i + 1) samples,
+  // at weights that make up for the others: see survives() in radiance.h.
+  int halving[kMostHalvings] = {kMostBounces + 1, kMostBounces + 1, kMostBounces + 1,
+                                kMostBounces + 1};
 
   bool operator==(const EffectSelection&) const = default;
 };
