@@ -81,7 +81,7 @@ int fewest_bounces(const LightSurvey& survey, const EffectOrder& order) {
 // rounded to powers of two. The first two vertices always see every sample.
 void choose_halvings(const LightSurvey& survey, EffectSelection* selection) {
   const double albedo = survey.mean_albedo;
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < kMostHalvings; ++i) {
     if (!(albedo > 0) || albedo >= 1) continue;
     const double depth = (i + 1) * std::log(0.5) / std::log(albedo);
     selection->halving[i] =
@@ -149,10 +149,11 @@ class Decision {
       if (count == 0) {
         add(punctual_name(kind), false, "No " + noun + " shines.", 0);
       } else {
-        add_light(
-            punctual_name(kind),
-            count == 1 ? "One " + noun + " shines" : std::to_string(count) + " " + noun + "s shine",
-            bounds_.punctual(kind));
+        add_light(punctual_name(kind),
+                  (count == 1 ? "One " + noun + " lights surfaces"
+                              : std::to_string(count) + " " + noun + "s light surfaces") +
+                      ", unseen by the probe itself",
+                  bounds_.punctual(kind));
       }
     }
   }

@@ -1,5 +1,6 @@
 #include "core/trace/radiance.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <utility>
@@ -47,10 +48,25 @@ struct Vertex {
 
 }  // namespace
 
+namespace {
+
+struct SampleRound {
+  uint32_t first, length;
+};
+SampleRound round_of(uint32_t index) {
+  if (index < kFirstSamples) return {0, kFirstSamples};
+  return {std::bit_floor(index), std::bit_floor(index)};
+}
+
+}  // namespace
+
+int most_halvings(uint32_t index) {
+  return std::min(kMostHalvings, std::countr_zero(round_of(index).length));
+}
+
 bool survives(uint32_t index, int halvings) {
-  const uint32_t first = index < kFirstSamples ? 0 : std::bit_floor(index);
-  const uint32_t length = index < kFirstSamples ? kFirstSamples : first;
-  return index - first < (length >> halvings);
+  const SampleRound round = round_of(index);
+  return index - round.first < (round.length >> halvings);
 }
 
 unsigned radiance_mask(const EffectSelection& s) {
@@ -73,6 +89,7 @@ struct PathKernel {
   RayCounters& counters;
   Vec3 radiance{};
   Vec3 throughput{1, 1, 1};
+  float thinning = 1;     // the part of throughput that stands for samples that ended early
   float scatter_pdf = 0;  // of the ray under way; 0 for the first, which nothing else could sample
   bool first = true;
 
@@ -113,18 +130,21 @@ struct PathKernel {
     }
   }
 
-  // No light left to carry: black surface, or under the floor that the order's bound allows.
+  // No light left to carry: black surface, or under the floor that the order's bound allows. The
+  // weight of thinning makes up for paths that ended, so it is no light of this one.
   bool spent() const {
     const float largest = std::max(throughput.x, std::max(throughput.y, throughput.z));
-    return largest <= scene.selection_.throughput_floor;
+    return largest <= scene.selection_.throughput_floor * thinning;
   }
 
-  // The fixed fractions of samples that visit deep vertices, at weights that make up for them.
+  // The fixed shares of samples that visit deep vertices, at weights that make up for them.
   bool goes_on(int next_vertex) {
-    for (int i = 0; i < 2; ++i) {
+    const int halvings = most_halvings(index);
+    for (int i = 0; i < halvings; ++i) {
       if (next_vertex != scene.selection_.halving[i]) continue;
       if (!survives(index, i + 1)) return false;
       throughput *= 2.0f;
+      thinning *= 2.0f;
     }
     return true;
   }

@@ -10,8 +10,8 @@
 // by the power heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997,
 // section 9.2). Without sampling it simply counts fully, so that a furnace has no noise.
 //
-// No roulette. Deep vertices are visited by fixed fractions of the samples instead (halving, see
-// survives()): the count is exact within every doubling, so a constant stays a constant.
+// No roulette. Deep vertices are visited by fixed shares of the samples instead (see survives()):
+// the count is exact within every round, so a constant stays a constant.
 
 #include <memory>
 
@@ -39,9 +39,10 @@ unsigned radiance_mask(const EffectSelection& selection);
 // Samples a replicate takes in its first round; rounds double what there is.
 inline constexpr uint32_t kFirstSamples = 4;
 
-// Whether sample `index` of a replicate is one of the 1 in 2^halvings that go on, halvings 0..2.
-// Of each round, [0, 4), [4, 8), [8, 16), ..., exactly the first 1 / 2^halvings are, which is an
-// aligned block of the sequence.
+// Samples come in rounds [0, 4), [4, 8), [8, 16), ... of a replicate. The one in 2^halvings that go
+// on are the first of their round, an aligned block of the sequence, so that every round has its
+// exact share. A round of n samples can be halved log2(n) times.
+int most_halvings(uint32_t index);
 bool survives(uint32_t index, int halvings);
 
 class RadianceScene {
