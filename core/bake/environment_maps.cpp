@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <mutex>
 
 #include "core/bake/environment_outputs.h"
 #include "core/bake/kitchen.h"
@@ -250,6 +251,29 @@ Plan environment_maps_plan(EnvironmentMapsState& state, Progress& progress) {
   return plan;
 }
 
+namespace {
+
+// Maps the loops of one output, each of which runs from 0 to 1, onto a share that only grows.
+class OutputProgress {
+ public:
+  OutputProgress(Progress& job, double begin, double end)
+      : part([this, &job, begin, end](double share) {
+          const std::lock_guard lock(mutex_);
+          furthest_ = std::max(furthest_, begin + (end - begin) * share);
+          job.update(furthest_);
+          return true;
+        }) {}
+
+ private:
+  std::mutex mutex_;
+  double furthest_ = 0;
+
+ public:
+  Progress part;
+};
+
+}  // namespace
+
 ChunkResult environment_maps_chunk(EnvironmentMapsState& state, const Plan& plan,
                                    const ElementRange& range, Progress& progress) {
   const double start_s = wall_seconds(), start_cpu_s = process_cpu_seconds();
@@ -259,14 +283,18 @@ ChunkResult environment_maps_chunk(EnvironmentMapsState& state, const Plan& plan
   for (uint64_t element = range.first; element < range.first + range.count; ++element) {
     progress.check();
     const size_t index = static_cast<size_t>(element);
+    const double done = static_cast<double>(element - range.first);
+    const double all = static_cast<double>(range.count);
+    OutputProgress output(progress, done / all, (done + 1) / all);
     if (state.outputs[index].kind == OutputKind::sh) {
-      for (const Vec3d& c : make_sh(state, state.outputs[index].size, progress).coefficients) {
+      const int bands = state.outputs[index].size;
+      for (const Vec3d& c : make_sh(state, bands, output.part).coefficients) {
         writer.f64(c.x);
         writer.f64(c.y);
         writer.f64(c.z);
       }
     } else {
-      writer.floats(make_image(state, index, progress).pixels);
+      writer.floats(make_image(state, index, output.part).pixels);
     }
     const double bound = output_bound(state, index);
     round.error_sum_sq += bound * bound;

@@ -200,7 +200,7 @@ void fill_pole(const Task& task, bool north, Image* cube, Progress& progress) {
   std::vector<Sums> cells(static_cast<size_t>(size) * static_cast<size_t>(size));
   for (const SideFace& side : kSides) {
     for (int i = 0; i < size; ++i) {
-      if (i % 64 == 0) progress.check();
+      if (i % 64 == 0) progress.update(0.5);
       for (const Strip& strip : strips(side, i, size, task.map.width, kPoleStrip / size)) {
         const double width = strip.end - strip.begin;
         const double u = side.centre + 0.5 * (strip.begin + strip.end) / (2 * kPi);
