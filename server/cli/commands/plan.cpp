@@ -21,13 +21,13 @@ void print_prices(const Plan& plan) {
   for (const Price& price : plan.prices)
     table.rows.push_back({format_error(price.error), format_count(price.samples),
                           format_seconds(price.seconds),
-                          price.extrapolated ? "extrapolated" : "measured"});
+                          price.extrapolated ? "extrapolated" : "by the pilot"});
   print_table(std::cout, table);
 }
 
 void print_plan(const Plan& plan) {
-  std::cout << kind_name(plan.kind) << ": " << format_count(plan.elements) << " x "
-            << printable(plan.element_unit) << " in " << plan.chunks.size() << " chunks, at most "
+  std::cout << kind_name(plan.kind) << ": " << format_count(plan.elements) << " elements ("
+            << printable(plan.element_unit) << ") in " << plan.chunks.size() << " chunks, at most "
             << format_count(plan.max_samples) << " samples each, "
             << format_seconds(plan.predicted_s) << " predicted\n\n";
   print_effects(plan);
