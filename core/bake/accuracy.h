@@ -42,7 +42,7 @@ struct ChunkReport {
 // (measured).
 struct Price {
   double error = 0;
-  uint64_t samples = 0;
+  uint64_t samples = 0;       // per element; their mean where elements stop one by one
   double seconds = 0;         // wall seconds with the granted threads
   bool extrapolated = false;  // no round reached this error; from the fitted slope
 };
