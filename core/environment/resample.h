@@ -12,7 +12,7 @@ namespace lightkiln {
 // texel. Nothing is skipped and nothing rings: energy is kept and a constant stays exact. Cells are
 // cut into meridian strips no wider than an eighth of a cube texel on the pole faces; what that
 // misplaces at a cell's corners stays under 1 % of the cell. The same bits for any number of
-// threads.
+// threads. `progress` may be told from two threads at once.
 Image resample_to_cube(const Image& latlong, int face_size, int threads, Progress& progress);
 
 // What the strips leave, as measured against a sum of points: rms over texels of the relative

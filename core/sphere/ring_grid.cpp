@@ -117,9 +117,9 @@ struct RingPairs {
 };
 
 // Sums over l of one order for kLanes ring pairs: even and odd l+m apart, six values each.
-void sum_order(const double* c, const LegendreStep& step, const Lanes& cosine, Lanes value,
+void sum_order(const double* c, const LegendreStep& step, const Lanes& cosine, const Lanes& start,
                int count, Lanes even[6], Lanes odd[6]) {
-  Lanes before{};
+  Lanes before{}, value = start;
   for (int i = 0; i < count; ++i, c += 6) {
     if (i > 0) {
       const size_t index = static_cast<size_t>(i);
