@@ -37,7 +37,7 @@ void print_faults(const Problem& problem) {
   for (const SpecFault& fault : problem.errors) {
     std::cerr << "  " << (fault.pointer.empty() ? "the document" : printable(fault.pointer)) << ": "
               << printable(fault.message);
-    if (!fault.suggestion.empty())
+    if (fault.message.find(fault.suggestion) == std::string::npos)
       std::cerr << " Did you mean \"" << printable(fault.suggestion) << "\"?";
     std::cerr << '\n';
   }
