@@ -16,7 +16,12 @@ int work(const lightkiln::WorkerConfig& config) {
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != config.parent_process) return 0;  // it ended before we asked to be told
   }
-  return lightkiln::run_worker(config.options);
+  try {
+    return lightkiln::run_worker(config.options);
+  } catch (const lightkiln::Error& error) {
+    if (error.code() == lightkiln::ErrorCode::cancelled) return 0;  // told to stop while it started
+    throw;
+  }
 }
 
 }  // namespace

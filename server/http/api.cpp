@@ -26,7 +26,7 @@ struct Api::Impl {
   RouteContext context;
 
   Admission admit(const HttpHead& head);
-  HttpReply handle(HttpRequest& request);
+  HttpReply handle(IncomingRequest& request);
   void served(const ServedRequest& request);
   void log_failure(const HttpHead& head, std::string_view what);
 };
@@ -101,7 +101,7 @@ Admission Api::Impl::admit(const HttpHead& head) {
   return admission;
 }
 
-HttpReply Api::Impl::handle(HttpRequest& request) {
+HttpReply Api::Impl::handle(IncomingRequest& request) {
   const HttpHead& head = request.head;
   Router::Match match = router.match(head.method, head.segments);
   RouteCall call{request, std::move(match.values)};
@@ -151,7 +151,7 @@ Api::~Api() = default;
 
 HttpApplication Api::application() {
   return {[this](const HttpHead& head) { return impl_->admit(head); },
-          [this](HttpRequest& request) { return impl_->handle(request); },
+          [this](IncomingRequest& request) { return impl_->handle(request); },
           [this](const ServedRequest& request) { impl_->served(request); }};
 }
 

@@ -43,10 +43,10 @@ struct Connection {
   int served = 0;            // replies sent
   bool armed_for_write = false;
 
-  std::string in;          // received, not yet used
-  HttpRequest request;     // the one in hand
-  uint64_t reserved = 0;   // of the budget for buffered bodies
-  bool streaming = false;  // holds one of the upload places
+  std::string in;           // received, not yet used
+  IncomingRequest request;  // the one in hand
+  uint64_t reserved = 0;    // of the budget for buffered bodies
+  bool streaming = false;   // holds one of the upload places
   Clock::time_point request_start;
 
   int status = 0;   // of the reply in hand

@@ -51,7 +51,7 @@ class BodyReader {
   virtual size_t read(char* data, size_t size) = 0;
 };
 
-struct HttpRequest {
+struct IncomingRequest {
   HttpHead head;
   std::string body;              // whole, when the route buffers bodies
   BodyReader* reader = nullptr;  // never null when the route streams bodies
@@ -104,7 +104,7 @@ struct ServedRequest {
 // sockets and must not block; `handle` runs on a pool thread and may throw Error.
 struct HttpApplication {
   std::function<Admission(const HttpHead&)> admit;
-  std::function<HttpReply(HttpRequest&)> handle;
+  std::function<HttpReply(IncomingRequest&)> handle;
   std::function<void(const ServedRequest&)> served;
 };
 

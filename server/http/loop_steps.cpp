@@ -88,7 +88,7 @@ void Loop::advance(Connection& c) {
 }
 
 void Loop::begin_request(Connection& c, size_t head_bytes) {
-  c.request = HttpRequest();
+  c.request = IncomingRequest();
   c.request_start = Clock::now();
   HttpHead& head = c.request.head;
   const auto fault = parse_head(std::string_view(c.in).substr(0, head_bytes), limits_.head, head);
@@ -232,7 +232,7 @@ void Loop::finish_reply(Connection& c) {
     c.enter(Phase::draining);
     return drain(c);
   }
-  c.request = HttpRequest();
+  c.request = IncomingRequest();
   c.enter(Phase::head);
   // Not at once: a long pipeline would nest as deep as it is long.
   if (!c.in.empty()) return pipelined_.push_back(c.fd);

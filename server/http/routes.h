@@ -57,7 +57,7 @@ struct RouteContext {
 };
 
 struct RouteCall {
-  HttpRequest& request;
+  IncomingRequest& request;
   std::vector<std::string> values;  // of the pattern's parameters
 };
 using Handler = HttpReply (*)(RouteContext&, RouteCall&);

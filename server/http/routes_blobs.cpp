@@ -30,7 +30,7 @@ void check_content_digest(const HttpHead& head, const std::string& digest) {
 
 HttpReply put_blob(RouteContext& context, RouteCall& call) {
   const std::string& digest = need_digest(call);
-  HttpRequest& request = call.request;
+  IncomingRequest& request = call.request;
   check_content_digest(request.head, digest);
   auto upload = context.store.begin_upload();
   upload->append(request.body.data(), request.body.size());

@@ -320,13 +320,13 @@ TEST_F(Attacks, APeerThatVanishesLeavesNothingBehind) {
 
 class Seam : public testing::Test {
  protected:
-  int serve(std::function<HttpReply(HttpRequest&)> handle) {
+  int serve(std::function<HttpReply(IncomingRequest&)> handle) {
     HttpApplication application;
     application.admit = [](const HttpHead& head) {
       if (head.path == "/admit") throw std::runtime_error("admit failed at /secret/path");
       return Admission{BodyRule::streamed, 1 << 30, std::nullopt};
     };
-    application.handle = [handle](HttpRequest& request) {
+    application.handle = [handle](IncomingRequest& request) {
       return request.head.path == "/livez" ? HttpReply{} : handle(request);
     };
     fence = std::make_unique<Fence>(hasty(), application);
@@ -337,7 +337,7 @@ class Seam : public testing::Test {
 
 TEST_F(Seam, AThrowingHandlerBecomesAProblemWithoutItsText) {
   for (const int what : {0, 1, 2}) {
-    const int port = serve([what](HttpRequest&) -> HttpReply {
+    const int port = serve([what](IncomingRequest&) -> HttpReply {
       if (what == 0) throw std::runtime_error("failed at /secret/path");
       if (what == 1) throw Error(ErrorCode::internal, "failed at /secret/path");
       throw 7;
@@ -356,7 +356,7 @@ TEST_F(Seam, ABodySourceThatFailsEndsTheConnectionNotTheDaemon) {
   const TemporaryFolder folder;
   const std::string path = folder.path() / "file";
   write_file(path, to_bytes("short"));
-  const int port = serve([&](HttpRequest& request) {
+  const int port = serve([&](IncomingRequest& request) {
     HttpReply reply;
     const bool directory = request.head.path == "/directory";
     const int fd = ::open(directory ? folder.path().c_str() : path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -372,7 +372,7 @@ TEST_F(Seam, ABodySourceThatFailsEndsTheConnectionNotTheDaemon) {
 }
 
 TEST_F(Seam, RepliesCannotBeSplitByTheirHeaders) {
-  const int port = serve([](HttpRequest&) {
+  const int port = serve([](IncomingRequest&) {
     HttpReply reply;
     return reply.set("X-Name", "a\r\nSet-Cookie: b");
   });
@@ -382,7 +382,7 @@ TEST_F(Seam, RepliesCannotBeSplitByTheirHeaders) {
 }
 
 TEST_F(Seam, AnUnreadUploadDoesNotBecomeTheNextRequest) {
-  const int port = serve([](HttpRequest&) { return HttpReply{}; });
+  const int port = serve([](IncomingRequest&) { return HttpReply{}; });
   RawClient client(port);
   const std::string hidden = "GET /hidden HTTP/1.1\r\nHost: localhost\r\n\r\n";
   client.send("PUT / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2000000\r\n\r\n" + hidden);
@@ -391,14 +391,14 @@ TEST_F(Seam, AnUnreadUploadDoesNotBecomeTheNextRequest) {
 }
 
 TEST_F(Seam, ASecondFenceOnThePortIsRefused) {
-  const int port = serve([](HttpRequest&) { return HttpReply{}; });
+  const int port = serve([](IncomingRequest&) { return HttpReply{}; });
   Fence second(hasty(), {});
   EXPECT_THROW(second.listen("127.0.0.1", port), Error);
 }
 
 TEST_F(Seam, StoppingLetsRequestsInHandFinish) {
   std::atomic<bool> entered{false};
-  const int port = serve([&](HttpRequest&) {
+  const int port = serve([&](IncomingRequest&) {
     entered = true;
     std::this_thread::sleep_for(milliseconds(300));
     return HttpReply{};
