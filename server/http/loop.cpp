@@ -78,7 +78,9 @@ void Loop::stop(int64_t drain_ms) {
   const uint64_t one = 1;
   (void)!::write(wake_, &one, sizeof one);
   thread_.join();
-  pool_.reset();  // joins handlers that are still at work; they must end by themselves
+  // Whoever still reads an upload is told that no more will come.
+  for (const auto& [fd, c] : connections_) ::shutdown(fd, SHUT_RDWR);
+  pool_.reset();  // joins handlers that are still at work
   connections_.clear();
 }
 
@@ -227,6 +229,7 @@ void Loop::sweep() {
 }
 
 void Loop::sweep_one(Connection& c, Clock::time_point now) {
+  if (c.phase == Phase::working) return;  // not ours
   const int64_t age = ms_since(c.phase_start, now);
   const bool slow =
       too_slow(c.phase_start, now, c.phase_bytes, limits_.grace_ms, limits_.least_bytes_per_s) ||
