@@ -470,6 +470,27 @@ TEST_F(StoreContract, AFullQueueAndAFullDiskSayTryAgain) {
   EXPECT_FALSE(store->health().writable);
 }
 
+TEST_F(StoreContract, ThreadsShareOneStore) {
+  constexpr int kThreads = 4, kJobs = 8;
+  std::vector<std::thread> threads;
+  for (int t = 0; t < kThreads; ++t)
+    threads.emplace_back([&, t] {
+      for (int i = 0; i < kJobs; ++i) {
+        const std::string id = submit(std::to_string(t) + "-" + std::to_string(i));
+        const std::optional<Claim> claim = store->claim("thread " + std::to_string(t), id);
+        if (claim) store->commit_plan(*claim, "{}", 1, 1);
+        store->list_jobs({});
+        store->wait_job(id, 0, 10);
+        store->health();
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+  int planned = 0;
+  for (const JobRecord& record : store->list_jobs({}))
+    planned += record.stage == JobStage::bake ? 1 : 0;
+  EXPECT_EQ(planned, kThreads * kJobs);
+}
+
 TEST_F(StoreContract, HealthCountsWhatWaitsAndRuns) {
   submit("one");
   submit("two");
