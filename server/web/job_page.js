@@ -61,8 +61,24 @@ function planOf(plan) {
     ),
     plan.warnings?.map((text) => element("p", { class: "problem" }, text)),
     table(["Effect", "", "Why", "#Bound"], plan.effects.map(effect)),
-    element("h2", {}, "What accuracy costs"),
-    table(["#Error", "#Samples", "#Predicted time"], plan.prices.map(price)),
+    plan.repairs.length > 0 &&
+      facts(plan.repairs.map((item) => [item.what.replaceAll("_", " "), format.count(item.count)])),
+    element("h2", {}, "What accuracy costs, as predicted"),
+    table(["#Error", "#Samples", "#Time"], plan.prices.map(price)),
+  ];
+}
+
+// What became of the prediction.
+function billOf(accuracy) {
+  return [
+    element("h2", {}, "What accuracy cost"),
+    facts([
+      ["Status", accuracy.status],
+      ["Predicted", format.seconds(accuracy.predicted_s)],
+      ["Actual", `${format.seconds(accuracy.actual_s)}, ${format.seconds(accuracy.cpu_s)} of CPU`],
+      ["Error", `${format.error(accuracy.error_rms)} rms, ${format.error(accuracy.error_max)} at worst`],
+      ["Error is", accuracy.error_unit],
+    ]),
   ];
 }
 
@@ -94,8 +110,8 @@ function artifactsOf(artifacts) {
 }
 
 export function jobPage(page, id) {
-  const parts = ["head", "plot", "plan", "artifacts"].map((name) => element("section", { id: `job-${name}` }));
-  const [head, plot, plan, artifacts] = parts;
+  const parts = ["head", "plot", "bill", "plan", "artifacts"].map((name) => element("section", { id: `job-${name}` }));
+  const [head, plot, bill, plan, artifacts] = parts;
   const canvas = element("div", { class: "plot", role: "img", "aria-label": "error against time" });
   const numbers = element("details", {});
   page.replaceChildren(...parts);
@@ -128,7 +144,9 @@ export function jobPage(page, id) {
       drawn = key;
       drawPlot(convergence);
     }
-    if (job.state === "succeeded") {
+    if (job.state === "succeeded" && !job.plan_only) {
+      const accuracy = await get(job.links.accuracy);
+      render(bill, JSON.stringify(accuracy), () => billOf(accuracy));
       const { items } = await get(job.links.artifacts);
       const previews = artifacts.dataset.key === job.id ? null : await previewsOf(items);
       render(artifacts, job.id, () => [element("h2", {}, "Artifacts"), previews, artifactsOf(items)]);
