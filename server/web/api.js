@@ -45,16 +45,6 @@ export async function get(path) {
   return body;
 }
 
-// The body of GET path, or null where the server has nothing there yet.
-export async function getIfAny(path) {
-  try {
-    return await get(path);
-  } catch (error) {
-    if (error instanceof Problem && (error.status === 404 || error.status === 409)) return null;
-    throw error;
-  }
-}
-
 export async function post(path) {
   const response = await fetch(path, {
     method: "POST",

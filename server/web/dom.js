@@ -9,7 +9,7 @@ export function element(name, properties = {}, ...children) {
     else if (key in node && key !== "list") node[key] = value;
     else node.setAttribute(key, value);
   }
-  for (const child of children.flat()) {
+  for (const child of children.flat(Infinity)) {
     if (child === undefined || child === null || child === false) continue;
     node.append(child);
   }
@@ -63,5 +63,5 @@ export function facts(pairs) {
 export function render(node, key, make) {
   if (node.dataset.key === key) return;
   node.dataset.key = key;
-  node.replaceChildren(...[make()].flat().filter(Boolean));
+  node.replaceChildren(...[make()].flat(Infinity).filter(Boolean));
 }

@@ -1,6 +1,6 @@
 // One job from order to artifacts: what it will do and why, what accuracy costs, what came out.
 
-import { addressOf, get, getIfAny, hasToken, post } from "/api.js";
+import { addressOf, get, hasToken, post } from "/api.js";
 import { element, facts, render, table } from "/dom.js";
 import * as format from "/format.js";
 import { progressOf } from "/jobs_page.js";
@@ -57,7 +57,7 @@ function planOf(plan) {
     element(
       "p",
       { class: "quiet" },
-      `${format.count(plan.elements)} × ${plan.element_unit} in ${plan.chunks.length} chunks; predicted ${format.seconds(plan.predicted_s)}.`,
+      `Elements: ${format.count(plan.elements)} (${plan.element_unit}), chunks: ${plan.chunks.length}; predicted ${format.seconds(plan.predicted_s)}.`,
     ),
     plan.warnings?.map((text) => element("p", { class: "problem" }, text)),
     table(["Effect", "", "Why", "#Bound"], plan.effects.map(effect)),
@@ -136,11 +136,13 @@ export function jobPage(page, id) {
   return async () => {
     const job = await get(`/v1/jobs/${id}`);
     render(head, JSON.stringify(job), () => headerOf(job));
-    const planned = await getIfAny(job.links.plan);
-    if (planned) render(plan, JSON.stringify(planned), () => planOf(planned));
-    const convergence = await getIfAny(job.links.convergence);
+    if (job.stage !== "plan") {
+      const planned = await get(job.links.plan);
+      render(plan, JSON.stringify(planned), () => planOf(planned));
+    }
+    const convergence = await get(job.links.convergence);
     const key = JSON.stringify(convergence);
-    if (convergence && key !== drawn) {
+    if (key !== drawn) {
       drawn = key;
       drawPlot(convergence);
     }

@@ -12,8 +12,8 @@ export function errorPlot(container, points, target) {
     width: Math.max(360, Math.min(760, container.clientWidth - 24)),
     height: 320,
     scales: {
-      x: { time: false, distr: 3 },
-      y: { distr: 3, range: (_plot, low, high) => padLog(Math.min(low, target), Math.max(high, target)) },
+      x: { time: false, distr: 3, range: (_plot, low, high) => wholeSteps(low, high) },
+      y: { distr: 3, range: (_plot, low, high) => wholeSteps(Math.min(low, target), Math.max(high, target)) },
     },
     axes: [
       { label: "seconds of baking", values: (_plot, ticks) => ticks.map(plain) },
@@ -41,8 +41,13 @@ function plain(value) {
   return Number(value.toPrecision(2)).toString();
 }
 
-function padLog(low, high) {
-  return [low / 1.5, high * 1.5];
+// A range that begins and ends on a step of its decade (0.02, 0.3, 70), as the ticks of a logarithmic axis
+// need, with at least one whole step of room on both sides.
+export function wholeSteps(low, high) {
+  const step = (value) => 10 ** Math.floor(Math.log10(value));
+  const below = low / 1.2;
+  const above = high * 1.2;
+  return [Math.floor(below / step(below)) * step(below), Math.ceil(above / step(above)) * step(above)];
 }
 
 // Rounds as the API gives them, as points of rising seconds; rounds without an error are left out.

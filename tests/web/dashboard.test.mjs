@@ -36,7 +36,8 @@ async function open(hash) {
 }
 
 test("a job is followed from order to artifacts, and the plot shows its points", async () => {
-  const job = await orderDemo(daemon.url, "ambient_occlusion");
+  const slower = (spec) => ({ ...spec, accuracy: { target_error: 0.006 } });
+  const job = await orderDemo(daemon.url, "ambient_occlusion", slower);
   const page = await open(`#/jobs/${job.id}`);
   await page.waitForSelector("#state");
   const seen = new Set();
