@@ -44,20 +44,24 @@ std::span<const std::byte> GltfBytes::named(const std::string& uri, const std::s
   return found->second;
 }
 
+bool GltfBytes::defined(size_t buffer_index) const {
+  const GltfBuffer& buffer = file_.buffers[buffer_index];
+  return buffer.uri || (buffer_index == 0 && file_.container.has_bin && !buffer.fallback);
+}
+
 std::span<const std::byte> GltfBytes::buffer(size_t index) {
   const GltfBuffer& buffer = file_.buffers[index];
   const std::string where = place("buffers", index);
-  std::span<const std::byte> bytes;
-  if (buffer.uri) {
-    bytes = buffers_[index] ? std::span<const std::byte>(*buffers_[index])
-                            : named(*buffer.uri, where + "/uri");
-  } else if (index == 0 && file_.container.has_bin && !buffer.fallback) {
-    bytes = file_.container.bin;
-  } else {
+  if (!defined(index)) {
     throw Error(ErrorCode::invalid_input,
                 "Buffer " + std::to_string(index) +
                     " is used but has neither a URI nor a GLB's binary chunk behind it.",
                 where);
+  }
+  std::span<const std::byte> bytes = file_.container.bin;
+  if (buffer.uri) {
+    bytes = buffers_[index] ? std::span<const std::byte>(*buffers_[index])
+                            : named(*buffer.uri, where + "/uri");
   }
   if (bytes.size() < buffer.length) {
     throw Error(ErrorCode::invalid_input,

@@ -18,6 +18,9 @@ class GltfBytes {
   // of what is never used.
   GltfBytes(const GltfFile& file, const GltfSource& source);
 
+  // False for a buffer of undefined contents: no URI and no binary chunk, which a file may have as
+  // long as nothing reads it.
+  bool defined(size_t buffer_index) const;
   // At least the buffer's stated length. Throws Error{invalid_input}: a missing or short file, by
   // name.
   std::span<const std::byte> buffer(size_t index);

@@ -17,6 +17,8 @@ namespace {
 const char* const kCompressions[] = {"KHR_draco_mesh_compression", "EXT_meshopt_compression",
                                      "KHR_meshopt_compression"};
 
+constexpr size_t kMaxUndefinedBytes = size_t{16} << 20;
+
 void append_u32(std::vector<std::byte>& bytes, size_t value) {
   for (int shift = 0; shift < 32; shift += 8) {
     bytes.push_back(static_cast<std::byte>((value >> shift) & 0xff));
@@ -200,10 +202,23 @@ class Writer {
     json.set("max", list(high));
   }
 
+  // Contents that the file leaves undefined, and that nothing reads, are written as zeros.
   void copy_views() {
     for (size_t i = 0; i < file_.views.size(); ++i) {
       if (replaced_.contains(i)) continue;
       JsonValue& view = json_.section("bufferViews")[i];
+      const GltfView& from = file_.views[i];
+      if (!from.meshopt && !bytes_.defined(from.buffer)) {
+        if (from.length > kMaxUndefinedBytes) {
+          throw Error(ErrorCode::too_large,
+                      "The view has " + std::to_string(from.length) +
+                          " bytes of undefined contents; at most " +
+                          std::to_string(kMaxUndefinedBytes) + " can be written.",
+                      "/bufferViews/" + std::to_string(i));
+        }
+        place_view(view, std::vector<std::byte>(from.length));
+        continue;
+      }
       place_view(view, bytes_.view(i));
       for (const char* name : kCompressions) erase_extension(view, name);
     }
