@@ -174,8 +174,8 @@ bool Client::upload(const std::string& digest, const std::filesystem::path& file
   return call(request).status == 201;
 }
 
-JobMessage Client::post_job(const std::string& path, const std::string& request_json,
-                            const std::string& idempotency_key, int wait_s) {
+SubmitAnswer Client::post_job(const std::string& path, const std::string& request_json,
+                              const std::string& idempotency_key, int wait_s) {
   Call request;
   request.request.method = "POST";
   request.request.path = path;
@@ -185,16 +185,18 @@ JobMessage Client::post_job(const std::string& path, const std::string& request_
   if (wait_s > 0) request.request.headers.emplace_back("Prefer", "wait=" + std::to_string(wait_s));
   request.request.read_timeout_s = wait_s;
   request.good = 202;
-  return read_job(call(request).body);
+  const Answer answer = call(request);
+  const auto replayed = answer.headers.find("idempotency-replayed");
+  return {read_job(answer.body), replayed != answer.headers.end() && replayed->second == "true"};
 }
 
-JobMessage Client::submit(const std::string& request_json, const std::string& idempotency_key,
-                          int wait_s) {
+SubmitAnswer Client::submit(const std::string& request_json, const std::string& idempotency_key,
+                            int wait_s) {
   return post_job("/v1/jobs", request_json, idempotency_key, wait_s);
 }
 
-JobMessage Client::submit_plan(const std::string& request_json, const std::string& idempotency_key,
-                               int wait_s) {
+SubmitAnswer Client::submit_plan(const std::string& request_json,
+                                 const std::string& idempotency_key, int wait_s) {
   return post_job("/v1/plans", request_json, idempotency_key, wait_s);
 }
 

@@ -49,6 +49,11 @@ struct JobQuery {
   std::string after;
 };
 
+struct SubmitAnswer {
+  JobMessage job;
+  bool replayed = false;  // the key was used before: the job is that of the earlier submission
+};
+
 class Client {
  public:
   // Throws Error{invalid_input} for a server that is no URL.
@@ -63,10 +68,10 @@ class Client {
   bool upload(const std::string& digest, const std::filesystem::path& file, uint64_t bytes);
 
   // `request_json` from write_job_request(); waits up to `wait_s` seconds for the end.
-  JobMessage submit(const std::string& request_json, const std::string& idempotency_key,
-                    int wait_s);
-  JobMessage submit_plan(const std::string& request_json, const std::string& idempotency_key,
-                         int wait_s);
+  SubmitAnswer submit(const std::string& request_json, const std::string& idempotency_key,
+                      int wait_s);
+  SubmitAnswer submit_plan(const std::string& request_json, const std::string& idempotency_key,
+                           int wait_s);
   // Waits up to `wait_s` seconds for the end of the job, and gives what it is then.
   JobMessage job(const std::string& id, int wait_s = 0);
   JobPage list(const JobQuery& query);
@@ -87,8 +92,8 @@ class Client {
   Answer call(const Call& call);
   Answer call_once(const Call& call);
   bool pause(int tried, double at_least_s);
-  JobMessage post_job(const std::string& path, const std::string& request_json,
-                      const std::string& idempotency_key, int wait_s);
+  SubmitAnswer post_job(const std::string& path, const std::string& request_json,
+                        const std::string& idempotency_key, int wait_s);
 
   ClientOptions options_;
 };

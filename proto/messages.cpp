@@ -92,12 +92,9 @@ void write_job_into(JsonWriter& writer, const JobMessage& job) {
       .member("state", job.state)
       .member("terminal", job.terminal)
       .member("stage", job.stage)
-      .member("reason", job.reason)
-      .key("spec")
-      .raw(job.spec_json)
-      .member("spec_digest", job.spec_digest)
-      .key("labels")
-      .begin_object();
+      .member("reason", job.reason);
+  if (!job.spec_json.empty()) writer.key("spec").raw(job.spec_json);
+  writer.member("spec_digest", job.spec_digest).key("labels").begin_object();
   for (const auto& [key, value] : job.labels) writer.member(key, value);
   writer.end_object().member("priority", job.priority).key("progress").begin_object();
   writer.member("done", job.progress.done)
@@ -141,7 +138,7 @@ JobMessage read_job_from(const JsonView& view) {
   job.terminal = view.boolean("terminal");
   job.stage = view.text("stage");
   job.reason = view.text("reason");
-  job.spec_json = text_of(view.at("spec").json());
+  if (view.has("spec")) job.spec_json = text_of(view.at("spec").json());
   job.spec_digest = view.text("spec_digest");
   for (const JsonMember& label : view.at("labels").members())
     job.labels[label.key] = view.view(label.value).text();

@@ -90,7 +90,7 @@ struct JobMessage {
   bool terminal = false;  // the state will not change by itself
   std::string stage;      // plan | bake | assemble | done
   std::string reason;     // why it is not running or not done
-  std::string spec_json;  // canonical; written as an object
+  std::string spec_json;  // canonical; written as an object when not empty; a page has none
   std::string spec_digest;
   std::map<std::string, std::string> labels;
   int priority = 0;

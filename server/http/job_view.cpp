@@ -33,7 +33,7 @@ EventMessage event_message(const EventRecord& event) {
   return {event.sequence, event.job_id, event.type, event.time_ms, event.json};
 }
 
-JobMessage job_message(const JobRecord& job, const std::vector<ArtifactRecord>& artifacts) {
+JobMessage listed_job_message(const JobRecord& job) {
   JobMessage message;
   message.id = job.id;
   message.name = job.name;
@@ -43,7 +43,6 @@ JobMessage job_message(const JobRecord& job, const std::vector<ArtifactRecord>& 
   message.terminal = is_terminal(job.state);
   message.stage = job_stage_name(job.stage);
   message.reason = job.reason;
-  message.spec_json = job.spec_json;
   message.spec_digest = job.spec_digest;
   message.labels = job.labels;
   message.priority = job.priority;
@@ -63,6 +62,12 @@ JobMessage job_message(const JobRecord& job, const std::vector<ArtifactRecord>& 
   message.created_ms = job.created_ms;
   message.started_ms = job.started_ms;
   message.finished_ms = job.finished_ms;
+  return message;
+}
+
+JobMessage job_message(const JobRecord& job, const std::vector<ArtifactRecord>& artifacts) {
+  JobMessage message = listed_job_message(job);
+  message.spec_json = job.spec_json;
   for (const ArtifactRecord& artifact : artifacts)
     message.artifacts.push_back(artifact_message(artifact));
   message.plan_json = job.plan_json;

@@ -12,6 +12,8 @@ namespace lightkiln {
 
 // Everything in it follows from the record, so that equal versions give equal bytes.
 JobMessage job_message(const JobRecord& job, const std::vector<ArtifactRecord>& artifacts);
+// As it stands in a list: without spec, plan and artifacts, which can be large.
+JobMessage listed_job_message(const JobRecord& job);
 ArtifactMessage artifact_message(const ArtifactRecord& artifact);
 EventMessage event_message(const EventRecord& event);
 

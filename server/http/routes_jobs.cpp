@@ -13,6 +13,11 @@ namespace lightkiln {
 namespace {
 
 constexpr uint64_t kUntilTerminal = UINT64_MAX;
+// A record of the store carries its whole spec, up to kMaxRequestBytes: only so many are held at a
+// time while a page is made.
+constexpr int kRecordsAtATime = 8;
+// A page ends after the job that brings it here.
+constexpr size_t kPageBytes = 1 << 20;
 
 std::string show(Store& store, const JobRecord& job) {
   const bool made = job.state == JobState::succeeded;
@@ -147,21 +152,32 @@ std::string escape_query(const std::string& text) {
   return result;
 }
 
+JobPage make_page(Store& store, JobFilter filter) {
+  const auto most = static_cast<size_t>(filter.limit);
+  filter.limit = kRecordsAtATime;
+  JobPage page;
+  for (size_t bytes = 0;;) {
+    const std::vector<JobRecord> records = store.list_jobs(filter);
+    for (const JobRecord& record : records) {
+      if (page.items.size() == most || bytes >= kPageBytes) {
+        page.next = page.items.back().id;
+        return page;
+      }
+      page.items.push_back(listed_job_message(record));
+      bytes += write_job(page.items.back()).size();
+    }
+    if (records.size() < kRecordsAtATime) return page;
+    filter.after = records.back().id;
+  }
+}
+
 HttpReply list_jobs(RouteContext& context, RouteCall& call) {
   const HttpHead& head = call.request.head;
-  JobFilter filter = parse_filter(head);
+  const JobFilter filter = parse_filter(head);
   // The version is read first: a change in between is then seen by the next conditional request.
   const std::string etag = list_etag(context.store.list_version());
   if (none_match_hits(head, etag)) return not_modified(etag);
-  const auto page_size = static_cast<size_t>(filter.limit);
-  JobPage page;
-  for (const JobRecord& job : context.store.list_jobs(filter))
-    page.items.push_back(job_message(job, {}));
-  if (page.items.size() >= page_size) {
-    filter.after = page.items.back().id;
-    filter.limit = 1;
-    if (!context.store.list_jobs(filter).empty()) page.next = filter.after;
-  }
+  const JobPage page = make_page(context.store, filter);
   HttpReply reply = tagged_reply(head, write_job_page(page), etag);
   if (!page.next.empty()) {
     std::string link = std::string(kApiPrefix) + "/jobs?";

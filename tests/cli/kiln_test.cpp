@@ -121,7 +121,8 @@ TEST(Kiln, ExitFollowsTheProblem) {
       {"invalid_spec", cli::kInvalidOrder}, {"too_large", cli::kInvalidOrder},
       {"unauthorized", cli::kUnauthorized}, {"forbidden", cli::kUnauthorized},
       {"not_found", cli::kNotFound},        {"conflict", cli::kFailed},
-      {"internal", cli::kFailed},           {"malformed_json", cli::kInvalidOrder}};
+      {"internal", cli::kFailed},           {"malformed_json", cli::kInvalidOrder},
+      {"cancelled", cli::kCancelled}};
   for (const auto& [code, exit] : problems) {
     ScriptedServer server(always(problem(code, "A sentence.")));
     const Outcome outcome = kiln_with(server, {"cancel", "01JOB"});
@@ -150,6 +151,27 @@ TEST(Kiln, TimeoutLeavesTheJobUnlessAskedToCancel) {
   EXPECT_EQ(kiln_with(server, {"wait", "01JOB", "--timeout", "0.2", "--cancel-on-timeout"}).code,
             cli::kTimedOut);
   EXPECT_EQ(server.requests().back().path, "/v1/jobs/01JOB:cancel");
+}
+
+TEST(Kiln, TimeoutEndsEveryVerbWithItsOwnCode) {
+  ScriptedServer server(always(problem("unavailable", "Full.")));
+  for (const char* verb : {"show", "cancel", "wait"}) {
+    const Outcome outcome = kiln_with(server, {verb, "01JOB", "--timeout", "0.3"});
+    EXPECT_EQ(outcome.code, cli::kTimedOut) << verb;
+    EXPECT_NE(outcome.err.find("--timeout passed"), std::string::npos) << outcome.err;
+  }
+}
+
+TEST(Kiln, ListsPageAfterPageUpToItsLimit) {
+  ScriptedServer server([](const ScriptedRequest& request) {
+    JobPage page{{job_in("failed"), job_in("failed")}, "01JOB"};
+    if (request.path.find("after=") != std::string::npos) page = {{job_in("queued")}, ""};
+    return http_answer(200, write_job_page(page));
+  });
+  const Outcome outcome = kiln_with(server, {"ls", "--json"});
+  EXPECT_EQ(read_job_page(outcome.out).items.size(), 3u);
+  EXPECT_EQ(server.requests().back().path, "/v1/jobs?limit=48&after=01JOB");
+  EXPECT_EQ(read_job_page(kiln_with(server, {"ls", "--json", "--limit", "2"}).out).next, "01JOB");
 }
 
 TEST(Kiln, PrintsDataToStdoutAndNothingElse) {
@@ -263,7 +285,7 @@ TEST(Client, TriesAgainWithTheSameKey) {
     return http_answer(202, write_job(job_in("queued")));
   });
   Client client(impatient(server));
-  EXPECT_EQ(client.submit("{}", "key-1", 0).id, "01JOB");
+  EXPECT_EQ(client.submit("{}", "key-1", 0).job.id, "01JOB");
   const auto requests = server.requests();
   ASSERT_EQ(requests.size(), 3u);
   for (const ScriptedRequest& request : requests) {
@@ -402,6 +424,28 @@ TEST(Bake, BakesWithADaemonOfItsOwnAndAnswersTheSecondFromTheStore) {
             0);
   EXPECT_GT(fs::file_size(png), 100u);
   EXPECT_EQ(kiln({"view", order.string(), "-o", png.string()}).code, cli::kInvalidOrder);
+  unsetenv("LIGHTKILN_KILND");
+}
+
+TEST(Bake, TriesAHopelessOrderOnce) {
+  const fs::path kilnd = fs::path(LIGHTKILN_BINARY_DIR) / "kilnd";
+  if (!fs::exists(kilnd) || !fs::exists(kilnd.parent_path() / "kiln-oven"))
+    GTEST_SKIP() << "kilnd and kiln-oven are not built";
+  setenv("LIGHTKILN_KILND", kilnd.c_str(), 1);
+  test::TemporaryFolder folder;
+  std::ofstream(folder.path() / "scene.glb") << "no scene at all";
+  const fs::path order = folder.path() / "order.json";
+  std::ofstream(order) << R"({"kind":"ambient_occlusion","inputs":{"scene":"scene.glb"}})";
+  for (int round = 0; round < 2; ++round) {
+    const Outcome outcome =
+        kiln({"bake", order.string(), "-o", (folder.path() / "out").string(), "--store",
+              (folder.path() / "store").string(), "--threads", "1", "--timeout", "120", "--json"});
+    EXPECT_EQ(outcome.code, cli::kFailed) << outcome.err;
+    const JobMessage job = read_job(outcome.out);
+    EXPECT_EQ(job.attempts, 1) << round;
+    ASSERT_TRUE(job.error);
+    EXPECT_EQ(job.error->code, "invalid_input");
+  }
   unsetenv("LIGHTKILN_KILND");
 }
 

@@ -34,7 +34,7 @@ Attention::~Attention() {
   handle_interrupts(SIG_DFL);
 }
 
-int Attention::interrupts() const {
+int Attention::interrupts() {
   return interrupt_count;
 }
 

@@ -14,7 +14,7 @@ class Attention {
   Attention(const Attention&) = delete;
   Attention& operator=(const Attention&) = delete;
 
-  int interrupts() const;  // Ctrl-C so far
+  static int interrupts();  // Ctrl-C since the last one was made
   bool timed_out() const;
   // Whether calls should end now. Nothing ends them while muted.
   bool wanted() const { return !muted_ && (interrupts() > 0 || timed_out()); }

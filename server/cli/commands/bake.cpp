@@ -33,6 +33,14 @@ void upload_missing(Session& session, const Order& order, const std::vector<std:
   }
 }
 
+bool hopeless(const JobMessage& job) {
+  if (!job.error) return false;
+  for (const ErrorCode code : {ErrorCode::invalid_spec, ErrorCode::invalid_input,
+                               ErrorCode::unsupported, ErrorCode::too_large})
+    if (job.error->code == error_code_name(code)) return true;
+  return false;
+}
+
 }  // namespace
 
 std::string prepare_order(Session& session) {
@@ -51,8 +59,10 @@ std::string submission_key(const Session& session, const std::string& request_js
   return "kiln-" + sha256_digest(text.data(), text.size()).substr(7, 48);
 }
 
-JobMessage revive(Session& session, const JobMessage& job) {
-  if (!session.is_private() || !job.terminal || job.state == "succeeded") return job;
+JobMessage revive(Session& session, const SubmitAnswer& answer) {
+  const JobMessage& job = answer.job;
+  if (!session.is_private() || !answer.replayed) return job;
+  if (!job.terminal || job.state == "succeeded" || hopeless(job)) return job;
   return session.client().retry(job.id);
 }
 
@@ -74,7 +84,7 @@ ExitCode bake(const Arguments& arguments) {
 ExitCode submit(const Arguments& arguments) {
   Session session(arguments, ServerNeed::must_be_named);
   const std::string request = prepare_order(session);
-  const JobMessage job = session.client().submit(request, submission_key(session, request), 0);
+  const JobMessage job = session.client().submit(request, submission_key(session, request), 0).job;
   std::cout << (arguments.json ? write_job(job) : printable(job.id)) << '\n';
   return kSucceeded;
 }

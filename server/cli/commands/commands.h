@@ -34,8 +34,9 @@ std::string prepare_order(Session& session);
 // An Idempotency-Key. With a private daemon it follows from the request, so that the same command
 // goes on with the same job.
 std::string submission_key(const Session& session, const std::string& request_json);
-// A private job that failed or was cancelled before is queued again.
-JobMessage revive(Session& session, const JobMessage& job);
+// A private job of an earlier command that failed or was cancelled then is queued again, unless
+// the order or its files were at fault: the same bytes would fail the same way.
+JobMessage revive(Session& session, const SubmitAnswer& answer);
 
 // Downloads into --output what is not there with the right bytes already; `only` empty = all.
 // Throws Error{not_found} for a name that the job has not.

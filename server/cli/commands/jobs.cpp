@@ -37,6 +37,22 @@ void print_job(const JobMessage& job) {
   line("digest", job.spec_digest);
 }
 
+// The server may end a page before --limit.
+JobPage list_pages(Session& session) {
+  const Arguments& arguments = session.arguments();
+  JobQuery query{arguments.state, arguments.kind,  arguments.text,
+                 arguments.label, arguments.limit, ""};
+  JobPage all;
+  do {
+    JobPage page = session.client().list(query);
+    for (JobMessage& job : page.items) all.items.push_back(std::move(job));
+    all.next = page.items.empty() ? "" : page.next;
+    query.limit = arguments.limit - static_cast<int>(all.items.size());
+    query.after = all.next;
+  } while (query.limit > 0 && !all.next.empty());
+  return all;
+}
+
 }  // namespace
 
 ExitCode wait(const Arguments& arguments) {
@@ -64,8 +80,7 @@ ExitCode fetch(const Arguments& arguments) {
 
 ExitCode ls(const Arguments& arguments) {
   Session session(arguments, ServerNeed::must_be_named);
-  const JobPage page = session.client().list(
-      {arguments.state, arguments.kind, arguments.text, arguments.label, arguments.limit, ""});
+  const JobPage page = list_pages(session);
   if (arguments.json) {
     std::cout << write_job_page(page) << '\n';
     return kSucceeded;

@@ -84,8 +84,12 @@ int run(int argc, const char* const* argv) {
   } catch (const ServerProblem& refusal) {
     std::cerr << "kiln: " << printable(refusal.what()) << '\n';
     print_faults(refusal.problem());
-    return exit_code(refusal);
+    return refusal.code() == ErrorCode::cancelled ? kCancelled : exit_code(refusal);
   } catch (const Error& error) {
+    if (error.code() == ErrorCode::cancelled && Attention::interrupts() == 0) {
+      std::cerr << "kiln: --timeout passed. " << printable(error.what()) << '\n';
+      return kTimedOut;
+    }
     std::cerr << "kiln: " << printable(error.what());
     if (!error.where().empty()) std::cerr << " (at " << printable(error.where()) << ")";
     std::cerr << '\n';
