@@ -79,6 +79,7 @@ void write_kind(JsonWriter& writer, const KindTable& table) {
   for (const ParameterGroup& group : table.groups) {
     if (group.create) group.create(spec);
     for (const ParameterRow& row : group.rows) {
+      if (row.refused) continue;
       writer.begin_object()
           .member("pointer", std::string(group.path) + "/" + std::string(row.name))
           .member("type", std::visit(TypeOf{}, row.member))

@@ -83,8 +83,10 @@ std::string canonical_spec(const Spec& given) {
   for (const ParameterGroup& group : table.groups) {
     if (group.present && !group.present(spec)) continue;
     JsonValue::Object& members = object_at(&root, group.path);
-    for (const ParameterRow& row : group.rows)
+    for (const ParameterRow& row : group.rows) {
+      if (row.refused) continue;
       members.push_back({std::string(row.name), std::visit(RowWriter{spec}, row.member)});
+    }
   }
   JsonWriter writer;
   writer.value(root, true);

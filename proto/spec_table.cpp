@@ -1,5 +1,7 @@
 #include "proto/spec_table.h"
 
+#include <algorithm>
+
 namespace lightkiln {
 namespace {
 
@@ -39,6 +41,13 @@ ParameterGroup accuracy_group() {
         kPositive, false,
         "Seconds that baking may be predicted to take; it pins a sample count before baking "
         "starts. null = no limit."}}};
+}
+
+// The group with the rows refused that a kind which takes no samples has no use for.
+ParameterGroup without(ParameterGroup group, std::initializer_list<std::string_view> names) {
+  for (ParameterRow& row : group.rows)
+    row.refused = std::find(names.begin(), names.end(), row.name) != names.end();
+  return group;
 }
 
 ParameterGroup root_group() {
@@ -95,7 +104,9 @@ KindTable ambient_occlusion_table() {
 }
 
 KindTable environment_maps_table() {
-  std::vector<ParameterGroup> groups = {root_group(), accuracy_group(), {"/parameters", {}}};
+  std::vector<ParameterGroup> groups = {without(root_group(), {"seed"}),
+                                        without(accuracy_group(), {"max_samples", "max_seconds"}),
+                                        {"/parameters", {}}};
   groups.push_back({"/parameters/sh",
                     {{"bands", +[](Spec& s) -> int& { return parameters<Maps>(s).sh->bands; },
                       kBands, false, kBandsMeaning}},

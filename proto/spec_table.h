@@ -38,6 +38,9 @@ struct ParameterRow {
   Range range;  // of numbers; of positions: how many
   bool required = false;
   std::string_view meaning;  // for clients: unit, what null means, what raising it costs
+  // The kind has no use for it: it is read only so that validate() can say why a value is refused,
+  // and neither stands in a canonical spec nor is told to clients.
+  bool refused = false;
 };
 
 // An object of a spec that holds parameters.

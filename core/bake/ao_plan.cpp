@@ -199,9 +199,7 @@ void add_effects(const AoState& state, const OpennessKernel& kernel, Plan* plan)
 }
 
 void price(const AoState& state, const Pilot& pilot, Plan* plan) {
-  const uint64_t granted =
-      std::bit_floor(std::max<uint64_t>(state.grants.max_rays_per_element, 64));
-  const uint64_t most = std::min({max_samples(state.spec), granted, uint64_t{1048576}});
+  const uint64_t most = max_samples(state.spec);
   const double target = target_error(state.spec);
   plan->max_samples = most;
   if (const auto limit = state.spec.accuracy.max_seconds) {

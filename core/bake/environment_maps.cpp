@@ -235,18 +235,12 @@ Plan environment_maps_plan(EnvironmentMapsState& state, Progress& progress) {
   const int bands = state.environment.constant ? 0 : transform_bands(state.outputs, state.lobes);
   plan.min_samples = plan.max_samples = static_cast<uint64_t>(bands);
 
-  const double threads = state.grants.threads > 0 ? state.grants.threads : 1;
+  const double threads = granted_threads(state.grants.threads);
   const double speed = measure_speed() / threads;
   plan.prices = list_prices(state, speed);
   plan.predicted_s =
       speed * model_seconds(state.environment, state.light, state.outputs, state.lobes);
   plan.chunks = split_chunks(plan.elements, plan.predicted_s * threads, state.grants.chunk_seconds);
-  const std::optional<double> limit = state.spec.accuracy.max_seconds;
-  if (limit && plan.predicted_s > *limit) {
-    plan.warnings.push_back("The order is predicted to take " + number(plan.predicted_s) +
-                            " s; smaller outputs, not a larger error, would bring it under the " +
-                            number(*limit) + " s of max_seconds.");
-  }
   plan.pilot_s = wall_seconds() - start_s;
   return plan;
 }

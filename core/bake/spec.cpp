@@ -180,6 +180,20 @@ void check_accuracy(const Accuracy& accuracy, Checker& checker) {
   checker.positive(accuracy.max_seconds, "/accuracy/max_seconds", "max_seconds");
 }
 
+// Environment maps are sums and transforms: nothing is drawn at random, so there are no samples to
+// limit, no seed to vary and no sample count that a time limit could pin.
+void refuse_sampling(const Spec& spec, Checker& checker) {
+  const std::string fixed = "environment_maps is deterministic and takes no samples, so it has no ";
+  const std::string instead = "; target_error and the sizes ordered set what it costs.";
+  if (spec.accuracy.max_samples)
+    checker.fault("/accuracy/max_samples", "conflict", fixed + "max_samples" + instead);
+  if (spec.accuracy.max_seconds)
+    checker.fault("/accuracy/max_seconds", "conflict", fixed + "max_seconds" + instead);
+  if (spec.seed != 0)
+    checker.fault("/seed", "conflict",
+                  fixed + "seed; equal orders have equal results, so leave it out.");
+}
+
 }  // namespace
 
 std::vector<SpecFault> validate(const Spec& spec) {
@@ -195,6 +209,7 @@ std::vector<SpecFault> validate(const Spec& spec) {
       refuse_input(spec.scene, "scene", kind, checker);
       require_input(spec.environment, "environment", kind, checker);
       check_environment_maps(std::get<EnvironmentMapsParameters>(spec.parameters), checker);
+      refuse_sampling(spec, checker);
       break;
     case Kind::probes:
       require_input(spec.scene, "scene", kind, checker);

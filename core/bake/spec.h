@@ -87,10 +87,10 @@ struct Accuracy {
   // it costs about 2.6 times the time where shadows have edges, 4 times where noise is independent.
   std::optional<double> target_error;
   // Samples per element and texel at the most, rounded up to a power of two; 64..1048576. None =
-  // 65536.
+  // 65536. Refused for environment maps, which take no samples.
   std::optional<uint64_t> max_samples;
   // CPU-independent promise: wall seconds that the plan may predict for baking, > 0. It pins a
-  // sample count before baking starts. None = no limit.
+  // sample count before baking starts. None = no limit. Refused for environment maps.
   std::optional<double> max_seconds;
 };
 
@@ -99,13 +99,14 @@ struct Spec {
   std::optional<InputRef> environment;  // environment_maps: required; probes: optional (black)
   std::variant<AmbientOcclusionParameters, EnvironmentMapsParameters, ProbesParameters> parameters;
   Accuracy accuracy;
-  uint64_t seed = 0;  // random streams are a pure function of it
+  uint64_t seed = 0;  // random streams are a pure function of it; 0 alone for environment maps
 
   Kind kind() const { return static_cast<Kind>(parameters.index()); }
 };
 
 double default_target_error(Kind kind);
 double target_error(const Spec& spec);
+// Of kinds that take samples.
 uint64_t max_samples(const Spec& spec);
 
 // A fault of a spec at a JSON pointer relative to the spec's root.
@@ -122,10 +123,14 @@ std::vector<SpecFault> validate(const Spec& spec);
 
 // What an operator grants; never part of a spec.
 struct Grants {
-  int threads = 0;                // 0 = one per processor
-  uint64_t max_memory_bytes = 0;  // 0 = no limit
-  uint64_t max_rays_per_element = 1u << 26;
+  int threads = 0;  // 0 = one per processor
+  // What the ray tracer's own structures may take: past it a job ends with out_of_memory instead of
+  // its process. It bounds nothing else; the process needs a limit of its own. 0 = no limit.
+  uint64_t max_memory_bytes = 0;
   double chunk_seconds = 4.0;  // work aimed at per chunk
+  // Rays that one element may cost, whatever was ordered. A limit of the engine and not a grant, so
+  // that equal orders have equal results under every operator.
+  static constexpr uint64_t max_rays_per_element = 1u << 26;
 };
 
 }  // namespace lightkiln

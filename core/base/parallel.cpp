@@ -4,6 +4,7 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -42,15 +43,18 @@ double wall_seconds() {
   return seconds(CLOCK_MONOTONIC);
 }
 
+int granted_threads(int threads) {
+  if (threads > 0) return threads;
+  return static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+}
+
 void parallel_blocks(size_t count, size_t block, int threads, Progress& progress,
                      const std::function<void(size_t, size_t)>& body, double progress_begin,
                      double progress_end) {
   if (count == 0) return;
   block = std::max<size_t>(block, 1);
   const size_t blocks = (count + block - 1) / block;
-  size_t workers = threads > 0 ? static_cast<size_t>(threads)
-                               : std::max<size_t>(1, std::thread::hardware_concurrency());
-  workers = std::min(workers, blocks);
+  const size_t workers = std::min(static_cast<size_t>(granted_threads(threads)), blocks);
 
   std::atomic<size_t> next{0};
   std::atomic<size_t> done{0};
@@ -79,10 +83,16 @@ void parallel_blocks(size_t count, size_t block, int threads, Progress& progress
     }
   };
 
-  std::vector<std::thread> pool;
-  for (size_t i = 1; i < workers; ++i) pool.emplace_back(run);
-  run();
-  for (std::thread& thread : pool) thread.join();
+  {
+    std::vector<std::jthread> pool;  // joins at the end of this block, however it is left
+    pool.reserve(workers - 1);
+    try {
+      for (size_t i = 1; i < workers; ++i) pool.emplace_back(run);
+    } catch (const std::system_error&) {
+      // The system has no more threads to give. Those that started and the caller do all blocks.
+    }
+    run();
+  }
   if (failure) std::rethrow_exception(failure);
 }
 

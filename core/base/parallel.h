@@ -23,10 +23,14 @@ class FlushDenormals {
   unsigned int saved_;
 };
 
+// The number of threads that a grant of `threads` means: itself above 0, else one per processor; at
+// least 1.
+int granted_threads(int threads);
+
 // Calls body(begin, end) for consecutive blocks of at most `block` items that cover [0, count), on
-// `threads` threads (1 runs on the caller; 0 means one per processor). The first exception stops
-// the loop and is rethrown on the caller. `progress` is asked before every block and told the share
-// of blocks done, mapped to [progress_begin, progress_end].
+// granted_threads(threads) threads (1 runs on the caller), or on as many of them as the system lets
+// start. The first exception stops the loop and is rethrown on the caller. `progress` is asked
+// before every block and told the share of blocks done, mapped to [progress_begin, progress_end].
 void parallel_blocks(size_t count, size_t block, int threads, Progress& progress,
                      const std::function<void(size_t begin, size_t end)>& body,
                      double progress_begin = 0.0, double progress_end = 1.0);

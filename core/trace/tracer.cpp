@@ -5,11 +5,11 @@
 #include <bit>
 #include <cmath>
 #include <string>
-#include <thread>
 
 #include <embree3/rtcore.h>
 
 #include "core/base/error.h"
+#include "core/base/parallel.h"
 #include "core/trace/texture.h"
 
 namespace lightkiln {
@@ -113,10 +113,7 @@ struct Tracer::Impl {
 
 Tracer::Impl::Impl(const Scene& scene_, const TracerOptions& options) : scene(&scene_) {
   isa = options.pin_isa ? pinned_isa() : unpinned_isa();
-  const unsigned int threads = options.build_threads > 0
-                                   ? static_cast<unsigned int>(options.build_threads)
-                                   : std::max(1u, std::thread::hardware_concurrency());
-  std::string config = "threads=" + std::to_string(threads);
+  std::string config = "threads=" + std::to_string(granted_threads(options.build_threads));
   if (options.pin_isa) config += std::string(",isa=") + isa;
   device = rtcNewDevice(config.c_str());
   if (!device) throw Error(ErrorCode::internal, "The ray tracing device could not be created.");

@@ -119,6 +119,23 @@ TEST(Spec, EnvironmentMapsAreHeldToTheirRanges) {
   EXPECT_TRUE(faults(spec).empty());
 }
 
+TEST(Spec, EnvironmentMapsRefuseWhatOnlySamplingCouldUse) {
+  Spec spec = maps();
+  spec.accuracy.max_samples = 1024;
+  spec.accuracy.max_seconds = 10;
+  spec.seed = 1;
+  EXPECT_EQ(faults(spec),
+            (std::vector<std::string>{"/accuracy/max_samples conflict",
+                                      "/accuracy/max_seconds conflict", "/seed conflict"}));
+  for (const SpecFault& fault : validate(spec))
+    EXPECT_NE(fault.message.find("deterministic"), std::string::npos) << fault.message;
+  for (Spec sampled : {ao(), probes()}) {
+    sampled.accuracy = spec.accuracy;
+    sampled.seed = spec.seed;
+    EXPECT_TRUE(faults(sampled).empty());
+  }
+}
+
 TEST(Spec, ProbesAreHeldToTheirRanges) {
   Spec spec = probes();
   auto& p = std::get<ProbesParameters>(spec.parameters);

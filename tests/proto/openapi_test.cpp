@@ -110,7 +110,7 @@ TEST(OpenApi, HasEveryRowWithItsDefaultAndRange) {
     const std::string stated = text(entry.find("default_target_error")) + " for " + kind_name(kind);
     EXPECT_NE(text(error->find("description")).find(stated), std::string::npos) << stated;
   }
-  EXPECT_EQ(rows, 26);
+  EXPECT_EQ(rows, 23);
 }
 
 TEST(OpenApi, HasNoParameterWithoutARow) {

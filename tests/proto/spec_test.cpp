@@ -143,6 +143,24 @@ TEST(SpecCanonical, IsStableUnderOrderSpaceAndDefaults) {
                           std::string(kEngineVersion).size() + 13));
 }
 
+TEST(SpecCanonical, EnvironmentMapsHaveNoSamplesNoSeedAndNoTimeLimit) {
+  const auto maps = [](const std::string& more) {
+    return R"({"kind":"environment_maps","inputs":{"environment":)" + kA +
+           R"(},"parameters":{"sh":{}})" + more + "}";
+  };
+  const std::string canonical = canonical_spec(parse_spec(maps("")).spec);
+  EXPECT_EQ(canonical, R"({"accuracy":{"target_error":0.001},"inputs":{"environment":)" + kA +
+                           R"(},"kind":"environment_maps","parameters":{"sh":{"bands":3}}})");
+  EXPECT_TRUE(faults_of(canonical).empty());
+  EXPECT_EQ(
+      faults_of(maps(R"(,"accuracy":{"max_samples":64,"max_seconds":1},"seed":2)")),
+      (Told{"/accuracy/max_samples conflict", "/accuracy/max_seconds conflict", "/seed conflict"}));
+  // What means "none" orders nothing, and so is the same order.
+  const std::string none = maps(R"(,"accuracy":{"max_samples":null,"max_seconds":null},"seed":0)");
+  EXPECT_TRUE(faults_of(none).empty());
+  EXPECT_EQ(canonical_spec(parse_spec(none).spec), canonical);
+}
+
 TEST(SpecCanonical, TellsOrdersApart) {
   const std::string base = canonical_spec(parse_spec(ao("")).spec);
   for (const char* parameters : {R"("max_distance":1)", R"("distribution":"uniform")",
@@ -176,11 +194,13 @@ Spec random_spec() {
       spec.scene->resources = {{"a.bin", digest()}, {"b/c.png", digest()}};
   }
   if (spec.kind() == Kind::environment_maps) spec.environment = InputRef{digest(), {}};
-  spec.seed = *rc::gen::arbitrary<uint64_t>();
   if (*rc::gen::arbitrary<bool>()) spec.accuracy.target_error = *rc::gen::inRange(1, 1000) / 1000.0;
-  if (*rc::gen::arbitrary<bool>())
-    spec.accuracy.max_samples = *rc::gen::inRange<uint64_t>(64, 1048577);
-  if (*rc::gen::arbitrary<bool>()) spec.accuracy.max_seconds = positive();
+  if (spec.kind() != Kind::environment_maps) {
+    spec.seed = *rc::gen::arbitrary<uint64_t>();
+    if (*rc::gen::arbitrary<bool>())
+      spec.accuracy.max_samples = *rc::gen::inRange<uint64_t>(64, 1048577);
+    if (*rc::gen::arbitrary<bool>()) spec.accuracy.max_seconds = positive();
+  }
   if (auto* p = std::get_if<AmbientOcclusionParameters>(&spec.parameters)) {
     p->falloff = Falloff(*rc::gen::inRange(0, 5));
     p->distribution = Distribution(*rc::gen::inRange(0, 2));
