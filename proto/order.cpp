@@ -51,6 +51,19 @@ void refuse_escape(const std::string& uri) {
                     "\"; only relative paths without \"..\" below its own folder are taken.");
 }
 
+// A name without ".." can still be a link that leads out, which the same order may have brought.
+fs::path resource_below(const fs::path& folder, const std::string& uri) {
+  std::error_code missing;
+  const fs::path root = fs::canonical(folder.empty() ? "." : folder, missing);
+  const fs::path target = fs::canonical(folder / uri, missing);
+  if (missing) return folder / uri;  // reading it says what is wrong
+  if (std::mismatch(root.begin(), root.end(), target.begin(), target.end()).first != root.end())
+    throw Error(ErrorCode::invalid_spec, "The file \"" + uri.substr(0, 200) +
+                                             "\" of the glTF is a link that leads out of its "
+                                             "folder; only files below the folder are taken.");
+  return target;
+}
+
 class Resolver {
  public:
   explicit Resolver(const fs::path& folder) : folder_(folder) {}
@@ -112,7 +125,8 @@ class Resolver {
   JsonValue::Object gltf_resources(const fs::path& path, const std::string& pointer) {
     JsonValue::Object resources;
     for (const std::string& uri : gltf_file_uris(read_text(path)))
-      resources.push_back({uri, JsonValue(add_file(path.parent_path() / uri, pointer))});
+      resources.push_back(
+          {uri, JsonValue(add_file(resource_below(path.parent_path(), uri), pointer))});
     return resources;
   }
 

@@ -107,6 +107,7 @@ void parse_listen(const std::string& text, ServeConfig& config) {
 }
 
 void check(const ServeConfig& config) {
+  for (const std::string& host : config.hosts) allowed_host(host);  // throws
   if (!is_loopback(config.host) && config.token_file.empty())
     throw Error(ErrorCode::invalid_spec,
                 "Listening on " + config.host +

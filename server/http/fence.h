@@ -39,6 +39,8 @@ struct FenceLimits {
   int threads = 48;
   size_t queue = 256;  // requests waiting for a thread; above: 503
   int uploads = 8;     // streamed at a time; above: 503
+  // Of one address once half of all places are taken, so that no slow sender shuts others out.
+  int uploads_per_address = 2;
 };
 
 class Fence {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <arpa/inet.h>
+
 #include "core/base/error.h"
 #include "proto/json.h"
 
@@ -101,8 +103,40 @@ bool is_loopback(std::string_view host) {
                      [](char c) { return (c >= '0' && c <= '9') || c == '.'; });
 }
 
+std::string allowed_host(const std::string& value) {
+  const Error wrong(ErrorCode::invalid_spec,
+                    "The host '" + value +
+                        "' must be a name of letters, digits, '-', '_' and '.', or an address, "
+                        "without a port.");
+  std::string bare = value;
+  const bool bracketed = bare.starts_with('[') && bare.ends_with(']');
+  if (bracketed) bare = bare.substr(1, bare.size() - 2);
+  if (bracketed || bare.find(':') != std::string::npos) {
+    bare = bare.substr(0, bare.find('%'));  // a zone means something on this host alone
+    in6_addr address{};
+    if (::inet_pton(AF_INET6, bare.c_str(), &address) != 1) throw wrong;
+    return host_name('[' + bare + ']');
+  }
+  const auto plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_' || c == '.';
+  };
+  if (bare.empty() || bare.size() > 253 || !std::all_of(bare.begin(), bare.end(), plain))
+    throw wrong;
+  return host_name(bare);
+}
+
+namespace {
+
+std::vector<std::string> allowed_hosts(std::vector<std::string> hosts) {
+  for (std::string& host : hosts) host = allowed_host(host);
+  return hosts;
+}
+
+}  // namespace
+
 Gate::Gate(std::vector<std::string> hosts, std::vector<Token> tokens)
-    : hosts_(std::move(hosts)), tokens_(std::move(tokens)) {}
+    : hosts_(allowed_hosts(std::move(hosts))), tokens_(std::move(tokens)) {}
 
 std::optional<Gate::Refusal> Gate::check_host(const HttpHead& head) const {
   const std::string* host = head.header("host");

@@ -36,10 +36,14 @@ std::vector<Token> parse_tokens(std::string_view text);
 // A literal address that only this host can reach.
 bool is_loopback(std::string_view host);
 
+// A name or an address as Host gives it, in lower case and without brackets. Throws
+// Error{invalid_spec} for a value with a port, or with a byte that no host name has.
+std::string allowed_host(const std::string& value);
+
 class Gate {
  public:
-  // `hosts`: names allowed in Host besides loopback ones, without ports. No tokens: every scope is
-  // open to whoever reaches the socket.
+  // `hosts`: names allowed in Host besides loopback ones, as allowed_host() takes them. No tokens:
+  // every scope is open to whoever reaches the socket.
   Gate(std::vector<std::string> hosts, std::vector<Token> tokens);
 
   struct Refusal {

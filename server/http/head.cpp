@@ -114,6 +114,13 @@ std::optional<HeadFault> parse_header_line(std::string_view line, HttpHead& head
   std::replace(lowered.begin(), lowered.end(), '_', '-');
   if (lowered.starts_with("remote-") || lowered.starts_with("local-"))
     return bad("Headers named REMOTE_* or LOCAL_* are not taken from clients.");
+  // Programs behind or before us may read '_' as '-' (RFC 3875, section 4.1.18) and frame by it.
+  static constexpr std::string_view kFraming[] = {"transfer-encoding", "content-length", "host",
+                                                  "connection",        "expect",         "te",
+                                                  "trailer",           "upgrade"};
+  if (name.find('_') != std::string_view::npos &&
+      std::find(std::begin(kFraming), std::end(kFraming), lowered) != std::end(kFraming))
+    return bad("A header that frames the request is spelt with '_' instead of '-'.");
   head.headers.emplace_back(lower(name), std::string(value));
   return std::nullopt;
 }

@@ -202,8 +202,7 @@ void Loop::take_finished() {
     drain_until_ = deadline_;
   }
   for (Connection* c : finished) {
-    if (c->streaming) --uploads_;
-    c->streaming = false;
+    give_upload_place_back(*c);
     c->enter(Phase::writing);
     send(*c);
   }

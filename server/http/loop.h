@@ -52,6 +52,8 @@ class Loop {
   void arm(Connection& c, bool for_write);
   void close(Connection& c);
 
+  bool take_upload_place(Connection& c);
+  void give_upload_place_back(Connection& c);
   bool make_room(const std::string& address);
   void render(Connection& c, const HttpReply& answer, bool close);
 
@@ -67,6 +69,7 @@ class Loop {
   std::vector<int> pipelined_;  // descriptors with a further request already received
   uint64_t reserved_ = 0;
   int uploads_ = 0;
+  std::unordered_map<std::string, int> uploads_per_address_;
 
   std::mutex mutex_;  // guards the next three
   std::vector<Connection*> finished_;

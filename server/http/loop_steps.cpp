@@ -107,6 +107,25 @@ void Loop::begin_request(Connection& c, size_t head_bytes) {
   begin_body(c, admission);
 }
 
+bool Loop::take_upload_place(Connection& c) {
+  const auto mine = uploads_per_address_.find(c.peer);
+  const bool many =
+      mine != uploads_per_address_.end() && mine->second >= limits_.uploads_per_address;
+  if (uploads_ >= limits_.uploads || (many && 2 * uploads_ >= limits_.uploads)) return false;
+  ++uploads_;
+  ++uploads_per_address_[c.peer];
+  c.streaming = true;
+  return true;
+}
+
+void Loop::give_upload_place_back(Connection& c) {
+  if (!c.streaming) return;
+  c.streaming = false;
+  --uploads_;
+  const auto mine = uploads_per_address_.find(c.peer);
+  if (--mine->second == 0) uploads_per_address_.erase(mine);
+}
+
 void Loop::begin_body(Connection& c, const Admission& admission) {
   const uint64_t length = c.request.head.content_length;
   if (length > 0 && admission.body == BodyRule::none)
@@ -117,7 +136,7 @@ void Loop::begin_body(Connection& c, const Admission& admission) {
                       " bytes long; Content-Length says " + std::to_string(length) + ".");
   const bool streamed =
       admission.body == BodyRule::streamed && length > limits_.buffered_body_bytes;
-  if (streamed && uploads_ >= limits_.uploads)
+  if (streamed && !take_upload_place(c))
     return refuse(c, 503, "Too many uploads are under way; try again shortly.");
   if (!streamed && reserved_ + length > limits_.buffered_bytes_total)
     return refuse(c, 503, "Too many request bodies are under way; try again shortly.");
@@ -125,11 +144,7 @@ void Loop::begin_body(Connection& c, const Admission& admission) {
     static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
     ::send(c.fd, kContinue.data(), kContinue.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   }
-  if (streamed) {
-    ++uploads_;
-    c.streaming = true;
-    return dispatch(c);
-  }
+  if (streamed) return dispatch(c);
   reserved_ += length;
   c.reserved = length;
   const size_t ready = std::min<uint64_t>(length, c.in.size());
@@ -145,8 +160,7 @@ void Loop::dispatch(Connection& c) {
   if (!c.streaming) c.unread_body = false;
   c.enter(Phase::working);
   if (pool_->try_push([this, &c] { work(c); })) return;
-  if (c.streaming) --uploads_;
-  c.streaming = false;
+  give_upload_place_back(c);
   refuse(c, 503, "The server is overloaded; try again shortly.");
 }
 

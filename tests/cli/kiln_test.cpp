@@ -358,6 +358,26 @@ TEST(Order, RefusesGltfFilesOutsideItsFolder) {
   EXPECT_EQ(gltf_file_uris(R"({"images":[{"uri":"sub/x.png"}]})").size(), 1u);
 }
 
+TEST(Order, FollowsLinksOnlyBelowTheFolderOfTheGltf) {
+  test::TemporaryFolder folder;
+  const fs::path inside = folder.path() / "scene";
+  fs::create_directories(inside / "sub");
+  std::ofstream(folder.path() / "secret") << "secret";
+  std::ofstream(inside / "sub" / "real.bin") << "buffer";
+  fs::create_symlink("sub/real.bin", inside / "good.bin");
+  fs::create_symlink("../secret", inside / "bad.bin");
+  fs::create_directory_symlink("..", inside / "up");
+  const auto read = [&](const std::string& uri) {
+    std::ofstream(inside / "room.gltf") << R"({"buffers":[{"uri":")" + uri + "\"}]}";
+    std::ofstream(folder.path() / "order.json")
+        << R"({"kind":"ambient_occlusion","inputs":{"scene":"scene/room.gltf"}})";
+    return read_order(folder.path() / "order.json");
+  };
+  EXPECT_EQ(read("good.bin").blobs.size(), 2u);
+  EXPECT_THROW(read("bad.bin"), Error);
+  EXPECT_THROW(read("up/secret"), Error);
+}
+
 TEST(Order, NamesTheInputThatCannotBeRead) {
   test::TemporaryFolder folder;
   std::ofstream(folder.path() / "order.json")

@@ -175,6 +175,35 @@ TEST_F(Attacks, DrippedBodiesAreCutOff) {
   }
 }
 
+TEST_F(Attacks, SlowUploadsOfOneAddressLeavePlacesToOthers) {
+  FenceLimits limits = Service::roomy();
+  limits.uploads = 4;
+  Service own(limits);
+  std::vector<std::unique_ptr<RawClient>> clients;
+  // Asks for a place and keeps it: the status that the request to go on is answered with.
+  const auto begin = [&](const char* from) {
+    clients.push_back(std::make_unique<RawClient>(own.port, from));
+    clients.back()->send(head("PUT /v1/blobs/sha256:" + std::string(64, '0'),
+                              "Expect: 100-continue\r\nContent-Length: 2000000\r\n"));
+    char word[12] = {};
+    EXPECT_EQ(::recv(clients.back()->fd(), word, sizeof word, MSG_WAITALL), 12);
+    return std::string(word + 9, 3);
+  };
+  EXPECT_EQ(begin("127.0.0.1"), "100");
+  EXPECT_EQ(begin("127.0.0.1"), "100");
+  EXPECT_EQ(begin("127.0.0.1"), "503") << "half of the places are taken, all by this address";
+  EXPECT_EQ(begin("127.0.0.2"), "100");
+  EXPECT_EQ(begin("127.0.0.2"), "100");
+  EXPECT_EQ(begin("127.0.0.3"), "503") << "all places are taken";
+  clients.erase(clients.begin(), clients.begin() + 2);  // the first address lets go
+  std::string next;
+  for (int i = 0; i < 100 && next != "100"; ++i) {
+    std::this_thread::sleep_for(milliseconds(20));
+    next = begin("127.0.0.3");
+  }
+  EXPECT_EQ(next, "100");
+}
+
 TEST_F(Attacks, BodiesOverTheLimitAreNotWaitedFor) {
   expect_refused(head("POST /v1/jobs",
                       "Content-Type: application/json\r\n"

@@ -98,6 +98,7 @@ TEST(CommandLine, SaysWhatIsWrong) {
   for (const char* listen : {"7420", "127.0.0.1", "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:65536",
                              ":7420", "::1:7420", "[::1:7420", "127.0.0.1:-1"})
     EXPECT_EQ(usage_error(parse("serve", "--store", "/s", "--listen", listen)), 2) << listen;
+  EXPECT_EQ(usage_error(parse("serve", "--store", "/s", "--allow-host", "farm.local:7420")), 2);
   EXPECT_EQ(usage_error(parse("--version")), 0);
   EXPECT_EQ(usage_error(parse("serve", "--help")), 0);
 }

@@ -52,6 +52,9 @@ TEST(Head, RefusesAmbiguousFraming) {
   EXPECT_EQ(verdict(with("Content-Length: 3\r\n", "POST")), 0);
   EXPECT_EQ(verdict(with("Content-Length: 3\r\n")), 400) << "a GET has no body";
   EXPECT_EQ(verdict(with("Content-Length: 0\r\n")), 0);
+  EXPECT_EQ(verdict(with("Content_Length: 3\r\n", "POST")), 400);
+  EXPECT_EQ(verdict(with("transfer_encoding: chunked\r\n", "POST")), 400);
+  EXPECT_EQ(verdict(with("X_Custom_Length: 3\r\n", "POST")), 0);
   EXPECT_EQ(verdict(with("Content-Length: 3\r\nContent-Length: 3\r\n", "POST")), 400);
   EXPECT_EQ(verdict(with("Content-Length: 3, 3\r\n", "POST")), 400);
   EXPECT_EQ(verdict(with("Content-Length: abc\r\n", "POST")), 400);

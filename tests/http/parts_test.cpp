@@ -87,6 +87,16 @@ TEST(Gate, LetsInOnlyKnownHostNames) {
     EXPECT_TRUE(gate.check_host(head_with({{"host", host}}))) << host;
 }
 
+TEST(Gate, TakesAllowedHostsInAnySpelling) {
+  const Gate gate({"Farm.Local", "[FE80::1]", "2001:db8::2", "fe80::3%eth0", "render_node"}, {});
+  for (const char* host : {"farm.local", "FARM.local:7420", "[fe80::1]", "[FE80::1]:80",
+                           "[2001:db8::2]:80", "[fe80::3]", "render_node:1"})
+    EXPECT_FALSE(gate.check_host(head_with({{"host", host}}))) << host;
+  for (const char* host : {"farm.local:7420", "http://farm.local", "farm local", "farm/local", "",
+                           "[farm.local]", "[::1]:80", "10.0.0.1:80", "f\xc3\xa4rm"})
+    EXPECT_THROW(Gate({host}, {}), Error) << host;
+}
+
 TEST(Gate, LetsNoOtherSiteChangeAnything) {
   const Gate gate({}, {});
   const auto passes = [&](std::vector<std::pair<std::string, std::string>> headers,

@@ -22,7 +22,7 @@ struct RawReply {
 
 class RawClient {
  public:
-  explicit RawClient(int port);
+  explicit RawClient(int port, const char* from = "127.0.0.1");
   ~RawClient();
   RawClient(const RawClient&) = delete;
   RawClient& operator=(const RawClient&) = delete;
