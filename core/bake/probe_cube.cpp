@@ -26,6 +26,14 @@ Place place_of(uint32_t texel, int size) {
           static_cast<int>(texel / n % n)};
 }
 
+// d(omega)/d(area of the face [-1, 1]^2) in a unit direction: the distance to the face is
+// 1 / cosine, so cosine / distance^2 = cosine^3, where the cosine is the largest component.
+double face_jacobian(const Vec3d& direction) {
+  const double cosine =
+      std::max({std::abs(direction.x), std::abs(direction.y), std::abs(direction.z)});
+  return cosine * cosine * cosine;
+}
+
 // A point of a texel: the direction through it, and d(omega)/d(area of the face [-1, 1]^2) there,
 // (1 + a^2 + b^2)^(-3/2) for face coordinates a, b: the squared distance to the plane point and its
 // cosine.
@@ -162,7 +170,90 @@ CubeSampling::CubeSampling(const RadianceScene& scene, const CubeTexels& texels,
       bands_(bands),
       threads_(threads),
       slots_(texels.texels.size()),
-      harmonics_(kReplicates * sh_coefficient_count(bands)) {}
+      harmonics_(kReplicates * sh_coefficient_count(bands)) {
+  const auto all = static_cast<size_t>(6 * texels.size * texels.size);
+  if (texels.texels.size() == all) return;
+  slot_by_texel_.assign(all, kNowhere);
+  for (size_t i = 0; i < texels.texels.size(); ++i) {
+    slot_by_texel_[texels.texels[i]] = static_cast<uint32_t>(i);
+  }
+}
+
+// Points are uniform in the texel's area A = (2 / N)^2 of the face, so a texel's samples have
+// density 1 / (A J) per steradian each; against kDirectPerSample searches that is its share.
+float CubeSampling::first_density(const Vec3d& direction) const {
+  const double area = 4.0 / (order_.size * order_.size);
+  return static_cast<float>(1 / (kDirectPerSample * area * face_jacobian(direction)));
+}
+
+uint32_t CubeSampling::slot_of(const Vec3d& direction) const {
+  int face = 0;
+  double s = 0, t = 0;
+  cube_coordinates(direction, &face, &s, &t);
+  const int n = order_.size;
+  const int x = std::min(static_cast<int>(s * n), n - 1);
+  const int y = std::min(static_cast<int>(t * n), n - 1);
+  const auto texel = static_cast<uint32_t>((face * n + y) * n + x);
+  return slot_by_texel_.empty() ? texel : slot_by_texel_[texel];
+}
+
+CubeSampling::Sighting CubeSampling::look(bool lamp, uint64_t replicate, uint32_t index,
+                                          RayCounters& counters) const {
+  const auto set =
+      static_cast<uint64_t>(lamp ? DimensionSet::probe_lamp : DimensionSet::probe_glare);
+  const uint64_t key = hash_combine(hash_combine(key_, replicate), set);
+  const auto density = [this](const Vec3& direction) {
+    return first_density(to_double(direction));
+  };
+  const DirectLight light = lamp ? scene_.lamp(origin_, sobol4(key, index), density, counters)
+                                 : scene_.glare(origin_, sobol2(key, index), density, counters);
+  if (!(light.radiance.x + light.radiance.y + light.radiance.z > 0)) return {};
+  return {slot_of(to_double(light.direction)), light};
+}
+
+// Searches in parallel, adds in order. A light of weight w found within a texel counts like one of
+// its n points: L w to its sum, and L w A J y / n to the harmonics, its share of the integral.
+void CubeSampling::look_directly(bool lamp, uint32_t from, uint32_t to, Progress& progress,
+                                 double done, RayCounters* counters,
+                                 std::vector<Vec3d>* harmonics) {
+  constexpr size_t kWave = 1 << 16, kBlock = 1 << 12;
+  const size_t each = size_t{kDirectPerSample} * (to - from), all = kReplicates * each;
+  const double area = 4.0 / (order_.size * order_.size);
+  const size_t coefficients = sh_coefficient_count(bands_);
+  std::vector<double> basis(coefficients);
+  std::vector<Sighting> found(std::min(all, kWave));
+  for (size_t first = 0; first < all; first += kWave) {
+    const size_t count = std::min(kWave, all - first);
+    std::vector<RayCounters> counted((count + kBlock - 1) / kBlock);
+    parallel_blocks(
+        count, kBlock, threads_, progress,
+        [&](size_t begin, size_t end) {
+          for (size_t i = begin; i < end; ++i) {
+            const size_t number = first + i;
+            const auto index = static_cast<uint32_t>(kDirectPerSample * from + number % each);
+            found[i] = look(lamp, number / each, index, counted[begin / kBlock]);
+          }
+        },
+        done, done);
+    for (const RayCounters& some : counted) *counters += some;
+    for (size_t i = 0; i < count; ++i) {
+      if (found[i].slot == kNowhere) continue;
+      const size_t replicate = (first + i) / each;
+      const Vec3d radiance = to_double(found[i].light.radiance);
+      Texel& slot = slots_[found[i].slot];
+      slot.sum += radiance;
+      slot.luminance[replicate] += luminance(radiance);
+      slot.largest = std::max(slot.largest, luminance(radiance));
+      if (bands_ == 0) continue;
+      const Vec3d direction = to_double(found[i].light.direction);
+      sh_evaluate_basis(direction, bands_, basis);
+      const Vec3d share = radiance * (area * face_jacobian(direction) / (to - from));
+      for (size_t c = 0; c < coefficients; ++c) {
+        (*harmonics)[replicate * coefficients + c] += share * basis[c];
+      }
+    }
+  }
+}
 
 // One texel's samples [from, to) of every replicate.
 //
@@ -176,6 +267,7 @@ void CubeSampling::sample_texel(size_t i, uint32_t from, uint32_t to, Progress& 
   const uint64_t texel_key = hash_combine(key_, order_.texels[i]);
   Texel& slot = slots_[i];
   TexelHarmonics harmonics(place, order_.size, bands_);
+  const bool looks = scene_.has_glare() || scene_.has_lamps();
   for (uint64_t r = 0; r < kReplicates; ++r) {
     progress.check();
     const uint64_t key = hash_combine(texel_key, r);
@@ -187,7 +279,8 @@ void CubeSampling::sample_texel(size_t i, uint32_t from, uint32_t to, Progress& 
       const CubePoint point = cube_point(place, order_.size, static_cast<double>(within.x),
                                          static_cast<double>(within.y));
       const Vec3d radiance =
-          to_double(scene_.sample({origin_, to_float(point.direction)}, key, k, block->counters));
+          to_double(scene_.sample({origin_, to_float(point.direction)}, key, k, block->counters,
+                                  looks ? first_density(point.direction) : 0));
       sum += radiance;
       slot.largest = std::max(slot.largest, luminance(radiance));
       harmonics.add(point, radiance);
@@ -228,6 +321,10 @@ Round CubeSampling::advance(Progress& progress, double progress_begin, double pr
       counters += block.counters;
       for (size_t c = 0; c < fresh.size(); ++c) fresh[c] += block.harmonics[c];
     }
+  }
+  for (const bool lamp : {false, true}) {
+    if (!(lamp ? scene_.has_lamps() : scene_.has_glare())) continue;
+    look_directly(lamp, from, to, progress, progress_end, &counters, &fresh);
   }
   const double old_share = static_cast<double>(from) / to;
   for (size_t c = 0; c < fresh.size(); ++c) {

@@ -6,6 +6,11 @@
 // integrated over the very samples, not over texels, so that they do not depend on the cube's size
 // but for noise; a constant gives its exact coefficients. Every number is a pure function of (key,
 // texel, replicate, index).
+//
+// Points in texels may all miss a sun or a small lamp that the probe sees itself, and then show no
+// variance either. So these are looked for as well (RadianceScene::glare, lamp), kDirectPerSample
+// times for each sample of a texel, and both ways are combined by their densities. The number is
+// small, so that light which spans many texels is left to the points in texels, which are even.
 
 #include <cstdint>
 #include <vector>
@@ -27,6 +32,8 @@ struct CubeTexels {
 CubeTexels all_texels(int size);
 // One texel, drawn by `seed`, of each cell of a grid of at most `cells` a side over every face.
 CubeTexels sparse_texels(int size, int cells, uint64_t seed);
+
+inline constexpr uint32_t kDirectPerSample = 16;
 
 class CubeSampling {
  public:
@@ -64,6 +71,18 @@ class CubeSampling {
     std::vector<Vec3d> harmonics;  // [replicate * bands^2 + coefficient]
   };
 
+  // What one search for direct light found.
+  struct Sighting {
+    uint32_t slot = kNowhere;
+    DirectLight light;
+  };
+  static constexpr uint32_t kNowhere = UINT32_MAX;
+
+  float first_density(const Vec3d& direction) const;
+  uint32_t slot_of(const Vec3d& direction) const;
+  Sighting look(bool lamp, uint64_t replicate, uint32_t index, RayCounters& counters) const;
+  void look_directly(bool lamp, uint32_t from, uint32_t to, Progress& progress, double done,
+                     RayCounters* counters, std::vector<Vec3d>* harmonics);
   void sample_texel(size_t i, uint32_t from, uint32_t to, Progress& progress, Block* block);
 
   const RadianceScene& scene_;
@@ -74,7 +93,8 @@ class CubeSampling {
   int threads_;
   uint32_t taken_ = 0;  // a replicate
   std::vector<Texel> slots_;
-  std::vector<Vec3d> harmonics_;  // by replicate, means over the samples so far
+  std::vector<uint32_t> slot_by_texel_;  // empty when all texels are asked for
+  std::vector<Vec3d> harmonics_;         // by replicate, means over the samples so far
   RayCounters counters_;
 };
 

@@ -29,6 +29,27 @@ int pilot_bounces(const LightSurvey& survey) {
   return static_cast<int>(std::clamp(std::ceil(bounces), 2.0, double{kMostBounces}));
 }
 
+// The mean luminance that one path and one search for each kind of direct light tell: all count
+// alike, at the paths' uniform density.
+double reference_sample(const RadianceScene& scene, const Vec3& origin, const Vec3& direction,
+                        uint64_t key, uint32_t index, RayCounters& counters) {
+  constexpr auto kDensity = static_cast<float>(1 / (4 * kPi));
+  const auto density = [](const Vec3&) { return kDensity; };
+  const auto set = [&](DimensionSet name) {
+    return hash_combine(key, static_cast<uint64_t>(name));
+  };
+  Vec3 sum = scene.sample({origin, direction}, key, index, counters, kDensity);
+  if (scene.has_glare()) {
+    const Point2 u = sobol2(set(DimensionSet::probe_glare), index);
+    sum += scene.glare(origin, u, density, counters).radiance;
+  }
+  if (scene.has_lamps()) {
+    const Point4 u = sobol4(set(DimensionSet::probe_lamp), index);
+    sum += scene.lamp(origin, u, density, counters).radiance;
+  }
+  return luminance(to_double(sum));
+}
+
 Vec3 uniform_direction(const Point2& u) {
   const double z = 1 - 2 * static_cast<double>(u.x);
   const double r = std::sqrt(std::max(0.0, 1 - z * z));
@@ -76,8 +97,8 @@ double pilot_luminance(ProbesState& state, const std::vector<uint64_t>& probes,
           const auto index = static_cast<uint32_t>(i % kReferencePaths);
           const Point2 u =
               sobol2(hash_combine(key, static_cast<uint64_t>(DimensionSet::probe_pilot)), index);
-          sum += luminance(to_double(
-              scene.sample({state.origin(probe), uniform_direction(u)}, key, index, counters)));
+          sum += reference_sample(scene, state.origin(probe), uniform_direction(u), key, index,
+                                  counters);
         }
         sums[begin / kPathsPerBlock] = sum;
       },

@@ -49,6 +49,8 @@ enum class DimensionSet : uint64_t {
   ao_shift = 2,
   probe_pixel = 16,
   probe_pilot = 17,
+  probe_glare = 18,
+  probe_lamp = 19,
   path_base = 64,  // path_base + 4 * bounce + {0 scatter, 1 environment, 2 emissive, 3 punctual}
 };
 

@@ -39,7 +39,7 @@ double normalised_prefix(const double* weights, int count, double* cdf) {
 
 }  // namespace
 
-EnvironmentSampler::EnvironmentSampler(const Environment& environment)
+EnvironmentSampler::EnvironmentSampler(const Environment& environment, double floor)
     : environment_(&environment) {
   const Image& image = environment.radiance;
   const size_t width = static_cast<size_t>(image.width), height = static_cast<size_t>(image.height);
@@ -48,7 +48,8 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment)
   std::vector<double> weights(width), rows(height);
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
-      weights[static_cast<size_t>(x)] = luminance(to_double(image.rgb(x, y)));
+      weights[static_cast<size_t>(x)] =
+          std::max(0.0, luminance(to_double(image.rgb(x, y))) - floor);
     }
     rows[static_cast<size_t>(y)] =
         normalised_prefix(weights.data(), image.width,

@@ -1,6 +1,7 @@
 #pragma once
 
-// Draws directions in proportion to an environment's luminance, exactly: a texel by its luminance
+// Draws directions in proportion to an environment's luminance, or to what of it exceeds a floor,
+// exactly: a texel by its luminance
 // times its true solid angle, then a point of its spherical rectangle uniform in solid angle.
 
 #include <cstdint>
@@ -12,7 +13,8 @@ namespace lightkiln {
 
 class EnvironmentSampler {
  public:
-  explicit EnvironmentSampler(const Environment& environment);
+  // Texels of luminance `floor` and under are never drawn.
+  explicit EnvironmentSampler(const Environment& environment, double floor = 0);
 
   struct Sample {
     Vec3 direction;
@@ -24,7 +26,7 @@ class EnvironmentSampler {
   // The density with which sample() returns `direction`.
   float pdf(const Vec3& direction) const;
 
-  // True when the map holds no light: the density is then uniform, 1/(4 pi).
+  // True when no texel exceeds the floor: the density is then uniform, 1/(4 pi).
   bool black() const { return black_; }
 
  private:

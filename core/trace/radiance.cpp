@@ -41,6 +41,11 @@ Vec3 cosine_hemisphere(float u, float v) {
   return {r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u)};
 }
 
+// q / (q + p); p may be infinite.
+float balance_heuristic(float q, float p) {
+  return p > 0 ? q / (q + p) : 1;
+}
+
 struct Vertex {
   SurfacePoint point;
   Vec3 normal;  // geometric, towards where the path came from
@@ -87,6 +92,7 @@ struct PathKernel {
   uint64_t key;
   uint32_t index;
   RayCounters& counters;
+  float first_density;
   Vec3 radiance{};
   Vec3 throughput{1, 1, 1};
   float thinning = 1;     // the part of throughput that stands for samples that ended early
@@ -94,8 +100,8 @@ struct PathKernel {
   bool first = true;
 
   static Vec3 run(const RadianceScene& scene, const Ray& ray, uint64_t key, uint32_t index,
-                  RayCounters& counters) {
-    PathKernel kernel{scene, key, index, counters};
+                  RayCounters& counters, float first_density) {
+    PathKernel kernel{scene, key, index, counters, first_density};
     kernel.trace(ray);
     return kernel.radiance;
   }
@@ -165,6 +171,8 @@ struct PathKernel {
       if constexpr ((kMask & kEnvironmentSamplingBit) != 0) {
         if (!first && scene.environment_sampler_) {
           weight = power_heuristic(scatter_pdf, scene.environment_sampler_->pdf(direction));
+        } else if (first && first_density > 0 && scene.glare_) {
+          weight = balance_heuristic(first_density, scene.glare_->pdf(direction));
         }
       }
       radiance += throughput * environment_radiance(*scene.environment_, direction) * weight;
@@ -174,9 +182,13 @@ struct PathKernel {
   // Density per solid angle of the emitters' sampler: density per area times d^2 / cos.
   void add_emission(const Hit& hit, float cosine) {
     float weight = 1;
-    if (!first && !scene.emitters_.empty()) {
-      const float per_area = scene.emitters_.area_density(hit.mesh);
-      weight = power_heuristic(scatter_pdf * cosine, per_area * hit.t * hit.t);
+    if (!scene.emitters_.empty()) {
+      const float looked_for = scene.emitters_.area_density(hit.mesh) * hit.t * hit.t;
+      if (!first) {
+        weight = power_heuristic(scatter_pdf * cosine, looked_for);
+      } else if (first_density > 0) {
+        weight = balance_heuristic(first_density * cosine, looked_for);
+      }
     }
     radiance += throughput * scene.colors_.emission<kDetail>(hit, counters) * weight;
   }
@@ -258,7 +270,7 @@ struct PathKernel {
 
 namespace {
 
-using Kernel = Vec3 (*)(const RadianceScene&, const Ray&, uint64_t, uint32_t, RayCounters&);
+using Kernel = Vec3 (*)(const RadianceScene&, const Ray&, uint64_t, uint32_t, RayCounters&, float);
 
 template <unsigned... kMasks>
 constexpr std::array<Kernel, sizeof...(kMasks)> kernel_table(
@@ -277,12 +289,44 @@ RadianceScene::RadianceScene(const Tracer& tracer, const Environment* environmen
   if (selection.environment) environment_ = environment;
   if (environment_ != nullptr && selection.environment_sampling) {
     environment_sampler_ = std::make_unique<EnvironmentSampler>(*environment_);
+    glare_ = std::make_unique<EnvironmentSampler>(*environment_,
+                                                  kGlareFloor * luminance(environment_->mean));
+    if (glare_->black()) glare_.reset();
   }
   if (selection.emissive && selection.emissive_sampling) {
     emitters_ = EmissiveSampler(tracer.scene(), survey);
   }
   punctual_ = PunctualLights(tracer.scene(), selection);
   kernel_ = kKernels[mask != 0 ? mask : radiance_mask(selection)];
+}
+
+DirectLight RadianceScene::glare(const Vec3& origin, const Point2& u, const FirstDensity& density,
+                                 RayCounters& counters) const {
+  const EnvironmentSampler::Sample light = glare_->sample(u.x, u.y);
+  ++counters.environment_reads;
+  ++counters.shadow_rays;
+  if (tracer_->occluded({origin, light.direction, 0, INFINITY}, counters)) return {};
+  return {light.direction, light.radiance * balance_heuristic(density(light.direction), light.pdf)};
+}
+
+DirectLight RadianceScene::lamp(const Vec3& origin, const Point4& u, const FirstDensity& density,
+                                RayCounters& counters) const {
+  const Hit light = emitters_.sample(u.x, u.y, u.z);
+  const SurfacePoint there = surface_point(tracer_->scene(), light);
+  const Vec3 between = there.position - origin;
+  const float distance2 = dot(between, between);
+  if (!(distance2 > 0)) return {};
+  const Vec3 direction = between / std::sqrt(distance2);
+  const float facing = -dot(there.normal, direction);
+  const bool lit = facing > 0 || (facing < 0 && colors_.record(light.mesh).double_sided);
+  if (!lit || !colors_.present(light, counters)) return {};
+  ++counters.shadow_rays;
+  const Vec3 along = offset_origin(there, -direction) - origin;
+  if (tracer_->occluded({origin, along, 0, kSegment}, counters)) return {};
+  const float cosine = std::abs(facing);
+  const float weight = balance_heuristic(density(direction) * cosine,
+                                         emitters_.area_density(light.mesh) * distance2);
+  return {direction, colors_.emission<true>(light, counters) * weight};
 }
 
 }  // namespace lightkiln

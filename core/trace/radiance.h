@@ -10,11 +10,17 @@
 // by the power heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997,
 // section 9.2). Without sampling it simply counts fully, so that a furnace has no noise.
 //
+// What the first ray meets by itself may be smaller than the rays are apart, such as the sun or a
+// small lamp. Whoever fills a cube or a sphere therefore looks for it too (glare(), lamp()) and
+// tells sample() its own density, so that both are combined.
+//
 // No roulette. Deep vertices are visited by fixed shares of the samples instead (see survives()):
 // the count is exact within every round, so a constant stays a constant.
 
+#include <functional>
 #include <memory>
 
+#include "core/base/random.h"
 #include "core/environment/sampler.h"
 #include "core/trace/effects.h"
 #include "core/trace/emissive_sampler.h"
@@ -45,6 +51,16 @@ inline constexpr uint32_t kFirstSamples = 4;
 int most_halvings(uint32_t index);
 bool survives(uint32_t index, int halvings);
 
+// The environment's luminance over this many times its mean is looked for directly; what is dimmer
+// is left to first rays, which are better at it.
+inline constexpr double kGlareFloor = 8;
+
+// Light seen directly, from where it was looked for.
+struct DirectLight {
+  Vec3 direction;  // unit; meaningless where radiance is 0
+  Vec3 radiance;   // 0 when hidden; weighted against the first rays that find it
+};
+
 class RadianceScene {
  public:
   // Keeps references to all but the selection. `environment` may be null. `mask` = 0 chooses the
@@ -54,20 +70,38 @@ class RadianceScene {
 
   // Radiance that arrives at the origin of `ray` against its direction, which is unit. `key` names
   // the randomisation (of seed, element, replicate), `index` the sample in it.
-  Vec3 sample(const Ray& ray, uint64_t key, uint32_t index, RayCounters& counters) const {
-    return kernel_(*this, ray, key, index, counters);
+  //
+  // `first_density` > 0 is the density per steradian of first rays in this direction for each call
+  // of glare() and of lamp(): light that these find as well counts q / (q + p), q this density and
+  // p theirs (the balance heuristic, Veach, section 9.2). Each light that they return counts as
+  // the radiance of a first ray in that direction does, since L / (q + p) = (L q / (q + p)) / q.
+  Vec3 sample(const Ray& ray, uint64_t key, uint32_t index, RayCounters& counters,
+              float first_density = 0) const {
+    return kernel_(*this, ray, key, index, counters, first_density);
   }
+  // Whether there is anything to look for; if not, sample() ignores first_density.
+  bool has_glare() const { return glare_ != nullptr; }
+  bool has_lamps() const { return !emitters_.empty(); }
+  // The brightest of the environment and one point of the emitters, seen from `origin`.
+  // `density` gives first_density of a direction.
+  using FirstDensity = std::function<float(const Vec3&)>;
+  DirectLight glare(const Vec3& origin, const Point2& u, const FirstDensity& density,
+                    RayCounters& counters) const;
+  DirectLight lamp(const Vec3& origin, const Point4& u, const FirstDensity& density,
+                   RayCounters& counters) const;
 
   const EffectSelection& selection() const { return selection_; }
 
  private:
-  using Kernel = Vec3 (*)(const RadianceScene&, const Ray&, uint64_t, uint32_t, RayCounters&);
+  using Kernel = Vec3 (*)(const RadianceScene&, const Ray&, uint64_t, uint32_t, RayCounters&,
+                          float);
   template <unsigned kMask>
   friend struct PathKernel;
 
   const Tracer* tracer_;
   const Environment* environment_ = nullptr;
   std::unique_ptr<EnvironmentSampler> environment_sampler_;
+  std::unique_ptr<EnvironmentSampler> glare_;
   EffectSelection selection_;
   SurfaceColors colors_;
   EmissiveSampler emitters_;
