@@ -75,6 +75,8 @@ void write_ao(JsonWriter& writer, const AoDocument& document) {
       .member("max", document.max)
       .member("error_rms", document.error_rms)
       .member("error_max", document.error_max)
+      .member("suspicious", document.suspicious)
+      .member("budget_limited", document.budget_limited)
       .end_object();
   writer.key("meshes").begin_array();
   for (const AoMeshIndex& mesh : document.meshes)
@@ -88,6 +90,8 @@ void write_ao(JsonWriter& writer, const AoDocument& document) {
         .member("mean", mesh.mean)
         .member("min", mesh.min)
         .member("max", mesh.max)
+        .member("suspicious", mesh.suspicious)
+        .member("budget_limited", mesh.budget_limited)
         .end_object();
   writer.end_array();
 }

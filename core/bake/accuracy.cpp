@@ -183,8 +183,11 @@ std::vector<Price> price_errors(const std::vector<Round>& rounds, uint64_t eleme
     }
     if (price.extrapolated) {
       const double samples = std::exp((model.log_c - std::log(error)) / model.beta);
-      price.samples = std::bit_ceil(static_cast<uint64_t>(std::clamp(samples, 1.0, 0x1p50)));
-      price.seconds = model.time.intercept + model.time.slope * static_cast<double>(price.samples);
+      const uint64_t fitted =
+          std::bit_ceil(static_cast<uint64_t>(std::ceil(std::clamp(samples, 1.0, 0x1p50))));
+      price.samples = std::max(fitted, 2 * rounds.back().samples);
+      price.seconds = std::max(
+          wall_s, model.time.intercept + model.time.slope * static_cast<double>(price.samples));
     }
     prices.push_back(price);
   }

@@ -38,13 +38,15 @@ struct ChunkReport {
   uint64_t budget_limited = 0;  // elements that ran out of samples
 };
 
-// A price: what reaching `error` would take, from the pilot (predicted) or from the rounds
-// (measured).
+// A price: what reaching `error` would take. Those of a plan are predictions, scaled up from the
+// pilot's elements to all; those of an accuracy record are measured unless extrapolated. `samples`
+// is what the error needs, not what this order allows: above the plan's max_samples the order
+// itself ends budget_limited before it.
 struct Price {
   double error = 0;
   uint64_t samples = 0;       // per element; their mean where elements stop one by one
   double seconds = 0;         // wall seconds with the granted threads
-  bool extrapolated = false;  // no round reached this error; from the fitted slope
+  bool extrapolated = false;  // some element needs more rounds than were run; from fitted slopes
 };
 
 enum class AccuracyStatus { converged, budget_limited, suspicious, exact };
@@ -78,8 +80,9 @@ AccuracyRecord summarise_accuracy(const std::vector<ChunkReport>& reports, doubl
                                   double predicted_s, const std::string& error_unit);
 
 // Fits log(error) = a - beta log(samples) over the rounds and reads prices off it, with
-// time = t0 + b * samples; a round that reached the error is quoted as measured. The error is the
-// rms of the elements' half-widths.
+// time = t0 + b * samples; a round that reached the error is quoted as measured. What no round
+// reached costs at least one round more than the last. The error is the rms of the elements'
+// half-widths.
 std::vector<Price> price_errors(const std::vector<Round>& rounds, uint64_t elements);
 
 }  // namespace lightkiln

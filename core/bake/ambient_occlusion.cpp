@@ -145,7 +145,8 @@ Artifact strip_artifact(const std::string& name, std::span<const float> values, 
   return {name, "image", "image/x-exr", write_exr(image, options)};
 }
 
-AoMeshIndex mesh_index(const SurfaceMesh& mesh, uint64_t first, std::span<const float> openness) {
+AoMeshIndex mesh_index(const SurfaceMesh& mesh, uint64_t first, std::span<const float> openness,
+                       std::span<const AccuracyStatus> statuses) {
   AoMeshIndex index;
   index.name = mesh.name;
   index.node = mesh.node;
@@ -158,18 +159,26 @@ AoMeshIndex mesh_index(const SurfaceMesh& mesh, uint64_t first, std::span<const 
   index.min = static_cast<double>(*least);
   index.max = static_cast<double>(*most);
   index.mean = tree_sum(openness) / static_cast<double>(openness.size());
+  const auto count_of = [&](AccuracyStatus status) {
+    return static_cast<uint64_t>(std::count(statuses.begin(), statuses.end(), status));
+  };
+  index.suspicious = count_of(AccuracyStatus::suspicious);
+  index.budget_limited = count_of(AccuracyStatus::budget_limited);
   return index;
 }
 
 AoDocument make_document(const AoState& state, std::span<const float> openness,
-                         std::span<const float> errors) {
+                         std::span<const float> errors, std::span<const AccuracyStatus> statuses) {
   AoDocument document;
   document.vertices = openness.size();
   for (size_t m = 0; m < state.scene.meshes.size(); ++m) {
     const uint64_t first = state.facets->first_vertex(m);
-    document.meshes.push_back(
-        mesh_index(state.scene.meshes[m], first,
-                   openness.subspan(first, state.facets->first_vertex(m + 1) - first)));
+    const uint64_t count = state.facets->first_vertex(m + 1) - first;
+    document.meshes.push_back(mesh_index(state.scene.meshes[m], first,
+                                         openness.subspan(first, count),
+                                         statuses.subspan(first, count)));
+    document.suspicious += document.meshes.back().suspicious;
+    document.budget_limited += document.meshes.back().budget_limited;
   }
   if (openness.empty()) return document;
   const auto [least, most] = std::minmax_element(openness.begin(), openness.end());
@@ -187,6 +196,13 @@ AoDocument make_document(const AoState& state, std::span<const float> openness,
   document.strip_width = static_cast<int>(std::min(openness.size(), width));
   document.strip_height = static_cast<int>((openness.size() + width - 1) / width);
   return document;
+}
+
+AccuracyStatus read_status(ByteReader* reader) {
+  const uint32_t value = reader->u32();
+  if (value > static_cast<uint32_t>(AccuracyStatus::exact))
+    throw Error(ErrorCode::internal, "A chunk holds a vertex status that does not exist.");
+  return static_cast<AccuracyStatus>(value);
 }
 
 // A price that no round reached comes from the plan's model, which knows how each vertex of the
@@ -207,16 +223,18 @@ void refine_prices(const Plan& plan, AccuracyRecord* record) {
 Assembly ao_assemble(AoState& state, const Plan& plan, std::span<const ChunkResult> chunks,
                      Progress& progress) {
   std::vector<float> openness, errors;
+  std::vector<AccuracyStatus> statuses;
   std::vector<ChunkReport> reports;
   openness.reserve(plan.elements);
   errors.reserve(plan.elements);
+  statuses.reserve(plan.elements);
   for (size_t i = 0; i < chunks.size(); ++i) {
     ByteReader reader(chunks[i].bytes);
     for (uint64_t k = 0; k < plan.chunks[i].count; ++k) {
       openness.push_back(reader.f32());
       errors.push_back(reader.f32());
       reader.u32();  // samples
-      reader.u32();  // status
+      statuses.push_back(read_status(&reader));
     }
     if (!reader.at_end()) throw Error(ErrorCode::internal, "A chunk holds more than its range.");
     reports.push_back(chunks[i].report);
@@ -226,7 +244,7 @@ Assembly ao_assemble(AoState& state, const Plan& plan, std::span<const ChunkResu
   progress.update(0.2);
 
   Assembly assembly;
-  AoDocument document = make_document(state, openness, errors);
+  AoDocument document = make_document(state, openness, errors, statuses);
   const VertexAttribute attributes[] = {{"_AO", openness}, {"_AO_ERROR", errors}};
   assembly.artifacts.push_back({"ambient_occlusion.glb", "glb", "model/gltf-binary",
                                 write_glb(state.source, state.scene, attributes,

@@ -88,9 +88,15 @@ Pilot run_pilot(const AoState& state, OpennessParameters parameters, Progress& p
   return pilot;
 }
 
-// The mean number of samples that the stopping rule spends on an element for `target`, at most
-// `cap` each. Past the pilot's rounds an element's error falls by 2^-beta a doubling.
-double mean_samples(const Pilot& pilot, double target, uint64_t cap) {
+struct Spending {
+  double mean_samples = 0;    // of all elements, those without rays included
+  bool extrapolated = false;  // some element needs more rounds than the pilot ran
+};
+
+// What the stopping rule spends on an element for `target`, at most `cap` samples each. Past the
+// pilot's rounds an element's error falls by 2^-beta a doubling.
+Spending spend(const Pilot& pilot, double target, uint64_t cap) {
+  Spending spending;
   double sum = 0;
   for (size_t e = 0; e < pilot.elements; ++e) {
     // Only elements without rays have no error at all.
@@ -99,16 +105,20 @@ double mean_samples(const Pilot& pilot, double target, uint64_t cap) {
     double error = 0;
     for (int look = 1;; ++look, samples *= 2) {
       const auto round = static_cast<size_t>(look - 1);
-      error = round < pilot.errors.size() ? pilot.errors[round][e] : error * std::exp2(-pilot.beta);
+      const bool seen = round < pilot.errors.size();
+      spending.extrapolated |= !seen;
+      error = seen ? pilot.errors[round][e] : error * std::exp2(-pilot.beta);
       if (samples >= cap || OpennessKernel::look_quantile(look) * error <= target) break;
     }
     sum += static_cast<double>(std::min(samples, cap));
   }
-  return pilot.elements == 0 ? 0 : sum / static_cast<double>(pilot.elements);
+  if (pilot.elements > 0) spending.mean_samples = sum / static_cast<double>(pilot.elements);
+  return spending;
 }
 
 double predict_seconds(const Pilot& pilot, uint64_t elements, double target, uint64_t cap) {
-  return mean_samples(pilot, target, cap) * static_cast<double>(elements) * pilot.seconds_per_ray;
+  return spend(pilot, target, cap).mean_samples * static_cast<double>(elements) *
+         pilot.seconds_per_ray;
 }
 
 // The largest sample count whose predicted time keeps the promise; never below 64.
@@ -120,13 +130,22 @@ uint64_t samples_in_time(const Pilot& pilot, uint64_t elements, double target, u
   return samples;
 }
 
+// The most that the falloff can add to an openness: the integral of mu over the hits is at most the
+// largest mu of a hit. Every falloff grows with distance, and no hit is farther than the scene is
+// long or rays reach.
+double largest_falloff(const AoState& state) {
+  const OpennessParameters p = openness_parameters(state);
+  const double farthest = std::min(length(state.scene.bounds.extent()), p.max_distance);
+  return std::min(1.0, falloff_weight(p, farthest));
+}
+
 Effect hit_distance_effect(const AoState& state) {
   const bool active = state.parameters().falloff != Falloff::none;
   return {"nearest_hit_distance", active,
           active ? "The falloff weighs each hit by its distance, so rays look for the nearest hit."
                  : "Without a falloff a hit counts fully at any distance: rays end at the first "
                    "hit they find.",
-          active ? 1.0 : 0.0};
+          active ? largest_falloff(state) : 0.0};
 }
 
 Effect max_distance_effect(const AoState& state) {
@@ -161,7 +180,7 @@ Effect falloff_effect(const AoState& state, const OpennessKernel& kernel) {
   if (p.falloff == Falloff::exponential)
     reason += " Rays end at " + number(kernel.reach() / state.scene.normalisation.scale()) +
               ", past which a hit could change the result by less than 6e-8.";
-  return {"falloff", true, reason, 1};
+  return {"falloff", true, reason, largest_falloff(state)};
 }
 
 void add_alpha_effects(const AoState& state, Plan* plan) {
@@ -212,10 +231,11 @@ void price(const AoState& state, const Pilot& pilot, Plan* plan) {
   plan->predicted_s = predict_seconds(pilot, plan->elements, target, plan->max_samples);
   const auto elements = static_cast<double>(plan->elements);
   for (const double error : kQuotedErrors) {
-    const double samples = mean_samples(pilot, error, uint64_t{1} << 40);
-    plan->prices.push_back({error, static_cast<uint64_t>(std::ceil(samples)),
-                            samples * elements * pilot.seconds_per_ray,
-                            samples > static_cast<double>(kFirstSamples << (kPilotRounds - 1))});
+    // No limit of samples: a price says what the error needs.
+    const Spending spending = spend(pilot, error, uint64_t{1} << 40);
+    plan->prices.push_back({error, static_cast<uint64_t>(std::ceil(spending.mean_samples)),
+                            spending.mean_samples * elements * pilot.seconds_per_ray,
+                            spending.extrapolated});
   }
 }
 

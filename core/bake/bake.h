@@ -51,13 +51,17 @@ struct AoMeshIndex {
   uint64_t first = 0;  // into the strip, in vertices
   uint64_t count = 0;
   double mean = 0, min = 0, max = 0;
+  // Vertices whose error bar cannot be trusted, and vertices that ran out of samples above the
+  // ordered error.
+  uint64_t suspicious = 0, budget_limited = 0;
 };
 struct AoDocument {
   std::vector<AoMeshIndex> meshes;
   uint64_t vertices = 0;
   double mean = 0, min = 0, max = 0;
   double error_rms = 0, error_max = 0;
-  int strip_width = 0, strip_height = 0;  // pixel i of the EXR strip is vertex i, row by row
+  uint64_t suspicious = 0, budget_limited = 0;  // summed over meshes
+  int strip_width = 0, strip_height = 0;        // pixel i of the EXR strip is vertex i, row by row
 };
 
 // Six directions with the RGB that evaluating the coefficients there must give, so that an importer

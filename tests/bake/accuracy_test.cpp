@@ -49,6 +49,20 @@ TEST(Accuracy, UnreachedErrorsFollowTheFittedLaw) {
   }
 }
 
+// The slope is clamped and only looks at rounds that everyone took part in, so it may claim that an
+// error was already within reach of rounds that did not reach it.
+TEST(Accuracy, WhatNoRoundReachedCostsMoreThanEveryRound) {
+  std::vector<Round> rounds = {round_of(256, 100, 0.2, 1), round_of(512, 100, 0.02, 1),
+                               round_of(1024, 100, 0.019, 1), round_of(2048, 100, 0.018, 1)};
+  rounds[2].elements = rounds[3].elements = 2;
+  for (const Price& price : price_errors(rounds, 100)) {
+    if (price.error >= 0.018) continue;
+    EXPECT_TRUE(price.extrapolated);
+    EXPECT_GE(price.samples, 4096u) << price.error;
+    EXPECT_GE(price.seconds, 4) << price.error;
+  }
+}
+
 TEST(Accuracy, PricesOfNothingAreZero) {
   for (const Price& price : price_errors({}, 0)) {
     EXPECT_EQ(price.seconds, 0);

@@ -31,7 +31,7 @@ TEST(Decode, NamesWhatItFoundInstead) {
   EXPECT_REFUSED(decode_hdr_image(unknown), invalid_input, "unknown kind");
 }
 
-// NUMERICS E1.
+// Values that are no light are counted by kind and made 0; the rest keeps its bits.
 TEST(Sanitise, CountsEachKindAndLeavesTheRestAlone) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const Image clean = test::ramp(50, 40, 3);

@@ -156,7 +156,7 @@ TEST(RadianceHdr, RefusesEveryTruncation) {
   }
 }
 
-// NUMERICS E3 allows 1/128 of the largest channel; rounding to nearest halves that.
+// The shared exponent allows 1/128 of the largest channel; rounding to nearest halves that.
 TEST(RadianceHdr, WritesWithinHalfAStepOfTheLargestChannel) {
   for (const int width : {1, 7, 8, 127, 128, 129, 400}) {
     Image image = test::ramp(width, 3, 3);

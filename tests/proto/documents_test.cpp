@@ -7,6 +7,7 @@
 #include "proto/json_value.h"
 #include "proto/messages.h"
 #include "proto/problem.h"
+#include "proto/spec_table.h"
 
 namespace lightkiln {
 namespace {
@@ -138,6 +139,28 @@ TEST(DocumentJson, CarriesConventionAndSelftest) {
   EXPECT_TRUE(json.find("dfg")->is_null());
   EXPECT_EQ(*json.find("artifacts")->array()->at(0).find("digest")->string(),
             sha256_digest("\x07", 1));
+}
+
+TEST(DocumentJson, CountsTheVerticesThatFellShort) {
+  AoDocument document;
+  document.vertices = 9;
+  document.suspicious = 2;
+  document.budget_limited = 5;
+  AoMeshIndex mesh;
+  mesh.name = "floor";
+  mesh.count = 9;
+  mesh.suspicious = 2;
+  mesh.budget_limited = 5;
+  document.meshes.push_back(mesh);
+  Assembly assembly;
+  assembly.document = document;
+  const JsonValue json =
+      read_trusted_json(write_document(assembly, empty_spec(Kind::ambient_occlusion), Plan{}),
+                        ErrorCode::internal, "x");
+  for (const JsonValue* counts : {json.find("statistics"), &json.find("meshes")->array()->at(0)}) {
+    EXPECT_EQ(counts->find("suspicious")->number(), 2);
+    EXPECT_EQ(counts->find("budget_limited")->number(), 5);
+  }
 }
 
 JobMessage full_job() {

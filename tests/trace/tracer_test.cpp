@@ -8,6 +8,7 @@
 #include "core/base/error.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/scene/gltf.h"
 #include "tests/trace/raw_scene.h"
 
 namespace lightkiln {
@@ -55,20 +56,31 @@ TEST(Tracer, FastModeLeaksWhereRobustDoesNot) {  // G1, positive control
   EXPECT_GT(random_leaks(false, 200'000).share(), 1e-3);
 }
 
-TEST(Tracer, RaysAimedAtEdgesAreStopped) {  // G1
+uint64_t leaks_at_edges(bool robust, uint64_t rays) {
   const MeshData sphere = make_sphere({0, 0, 0}, 1, 32, 64);
   const Scene scene = raw_scene(sphere);
-  const Tracer tracer(scene, {});
+  TracerOptions options;
+  options.robust = robust;
+  options.pin_isa = robust;
+  const Tracer tracer(scene, options);
   RayCounters counters;
   uint64_t leaks = 0;
-  for (size_t i = 0; i < 300'000; ++i) {
+  for (size_t i = 0; i < rays; ++i) {
     const auto& t = sphere.triangles[hash64(i) % sphere.triangles.size()];
     const float share = 0.05f + 0.9f * to_unit_float(static_cast<uint32_t>(hash64(i) >> 32));
     const Vec3 aim = sphere.positions[t[0]] * (1 - share) + sphere.positions[t[1]] * share;
     const Vec3 origin = random_direction(i) * 0.3f;
     leaks += !tracer.occluded({origin, aim - origin}, counters);
   }
-  EXPECT_EQ(leaks, 0u);
+  return leaks;
+}
+
+TEST(Tracer, RaysAimedAtEdgesAreStopped) {  // G1
+  EXPECT_EQ(leaks_at_edges(true, 300'000), 0u);
+}
+TEST(Tracer, RaysAimedAtEdgesLeakInFastMode) {  // G1, positive control
+  if (!__builtin_cpu_supports("fma")) GTEST_SKIP() << "this processor has no fused multiply-add";
+  EXPECT_GT(leaks_at_edges(false, 300'000), 0u);
 }
 
 TEST(Tracer, ClosedBoxLosesNoJitteredRayAndFewAimedAtVertices) {  // G2
@@ -100,7 +112,7 @@ SelfHits self_hits(float radius, float centre, Leave leave) {
   const Tracer tracer(scene, {});
   RayCounters counters;
   SelfHits result;
-  for (uint64_t i = 0; i < 20'000; ++i) {
+  for (uint64_t i = 0; i < 200'000; ++i) {
     const auto triangle = static_cast<uint32_t>(hash64(i) % scene.meshes[0].triangles.size());
     const float u = 0.98f * to_unit_float(static_cast<uint32_t>(hash64(~i)));
     const float v = (0.99f - u) * to_unit_float(static_cast<uint32_t>(hash64(~i) >> 32));
@@ -126,12 +138,12 @@ TEST(Tracer, ConvexSurfacesNeverHitThemselves) {  // G3
       if (radius < 1e-6f * centre * 50) continue;  // the mesh collapses in float
       const SelfHits result = self_hits(radius, centre, Leave::by_error_bound);
       EXPECT_EQ(result.hits, 0) << "R " << radius << " at " << centre;
-      EXPECT_LE(result.largest_move, 2e-6) << "R " << radius << " at " << centre;
+      EXPECT_LE(result.largest_move, 1e-6) << "R " << radius << " at " << centre;
     }
 }
 TEST(Tracer, WithoutAnOffsetHalfTheRaysHitTheirOwnSurface) {  // G3, positive control
-  EXPECT_GT(self_hits(1, 0, Leave::by_nothing).hits, 2000);
-  EXPECT_GT(self_hits(100, 1e4f, Leave::by_epsilon).hits, 2000);
+  EXPECT_GT(self_hits(1, 0, Leave::by_nothing).hits, 20'000);
+  EXPECT_GT(self_hits(100, 1e4f, Leave::by_epsilon).hits, 20'000);
 }
 
 TEST(Tracer, DyadicShiftKeepsDistancesBitForBit) {  // G5
@@ -191,7 +203,27 @@ TEST(Tracer, SliversNeverReportHitsOutsideTheScene) {  // G7
   EXPECT_EQ(missed, 0u);
 }
 
-TEST(Tracer, SeamLeaksInProportionToItsGap) {  // G8
+// Why the loader brings every scene to a size of about one: far from it float under- and overflows
+// inside the intersection, and a ray from the centre of a closed sphere misses it.
+TEST(Tracer, WithoutNormalisationTinyAndHugeScenesAreWrong) {  // G4, positive control
+  const auto hits = [](int exponent) {
+    const float scale = std::ldexp(1.0f, exponent);
+    const Scene scene = raw_scene(make_sphere({0, 0, 0}, scale, 16, 32));
+    const Tracer tracer(scene, {});
+    RayCounters counters;
+    int count = 0;
+    for (uint64_t i = 0; i < 1000; ++i)
+      count += tracer.nearest({{0, 0, 0}, random_direction(i)}, counters).hit();
+    return count;
+  };
+  for (const int harmless : {-10, 0, 10}) EXPECT_EQ(hits(harmless), 1000) << harmless;
+  EXPECT_LT(hits(-60), 1000);
+  EXPECT_LT(hits(58), 1000);
+}
+
+// Splitting a seam by a gap opens it, and nothing closes it again: the rim leaks by the gap's share
+// of the surface, and loading counts the open edges so that the plan can warn.
+TEST(Tracer, SeamsLeakInProportionToTheirGapAndAreCountedNotClosed) {  // G8
   // A unit cube whose +Y face is lifted by the gap: the rim of length 4 leaks about g L / A.
   constexpr float kGap = 1e-4f;
   MeshData box = test::make_box({0, 0, 0}, {1, 1, 1});
@@ -200,20 +232,24 @@ TEST(Tracer, SeamLeaksInProportionToItsGap) {  // G8
     box.positions[i].y += kGap;
   }
   const Scene scene = raw_scene(box);
-  const Scene welded = raw_scene(test::make_box({0, 0, 0}, {1, 1, 1}));
   const Tracer open_tracer(scene, {});
-  const Tracer welded_tracer(welded, {});
   RayCounters counters;
-  uint64_t leaks = 0, welded_leaks = 0;
+  uint64_t leaks = 0;
   constexpr uint64_t kRays = 1'000'000;
   for (uint64_t i = 0; i < kRays; ++i) {
     const Ray ray{Vec3{0.5f, 0.5f, 0.5f} + random_direction(i) * 0.2f, random_direction(~i)};
     leaks += !open_tracer.occluded(ray, counters);
-    welded_leaks += !welded_tracer.occluded(ray, counters);
   }
   EXPECT_GT(leaks, 0u);
   EXPECT_LE(static_cast<double>(leaks) / kRays, 1.5 * static_cast<double>(kGap) * 4 / 6 + 1e-5);
-  EXPECT_LE(static_cast<double>(welded_leaks) / kRays, 2e-5);
+  const auto open_edges = [](const MeshData& mesh) {
+    const std::vector<std::byte> file = test::make_glb(mesh);
+    return load_gltf({file, {}}, {}).report.open_edges;
+  };
+  // The four edges of the lifted face, and the four of the rim that it left. Without the gap the
+  // box is closed although its faces share no vertex.
+  EXPECT_EQ(open_edges(box), 8u);
+  EXPECT_EQ(open_edges(test::make_box({0, 0, 0}, {1, 1, 1})), 0u);
 }
 
 TEST(Tracer, RebuildsGiveTheSameHits) {  // R5
