@@ -54,8 +54,6 @@ constexpr ProblemKind kKindsOfProblem[] = {
      "The whole request must arrive within the time limits of the daemon."},
     {"length_required", 411, "A length is needed", false, ErrorCode::invalid_spec,
      "A request with a body must give its Content-Length."},
-    {"precondition_failed", 412, "The resource has changed", false, ErrorCode::conflict,
-     "If-Match names a version that is no longer the present one."},
     {"uri_too_long", 414, "The path is too long", false, ErrorCode::too_large,
      "The request line is over its limit."},
     {"unsupported_media_type", 415, "This media type is not accepted", false,
@@ -69,15 +67,11 @@ constexpr ProblemKind kKindsOfProblem[] = {
     {"misdirected", 421, "The host is not this one", false, ErrorCode::forbidden,
      "The Host header names a host that this daemon does not serve."},
     {"too_many_requests", 429, "Too many requests", true, ErrorCode::unavailable,
-     "A limit of rate or of queued jobs is reached. Retry-After says when to ask again."},
+     "Too many attempts failed within a minute. Retry-After says when to ask again."},
     {"headers_too_large", 431, "The headers are too large", false, ErrorCode::too_large,
      "The request's headers are over the limit of bytes or lines."},
-    {"not_implemented", 501, "This part of HTTP is not implemented", false, ErrorCode::unsupported,
-     "The request uses a transfer encoding or a method that the daemon does not speak."},
     {"version_not_supported", 505, "This version of HTTP is not supported", false,
      ErrorCode::unsupported, "Speak HTTP/1.1."},
-    {"insufficient_storage", 507, "The disk is full", true, ErrorCode::unavailable,
-     "Free space is under the floor that the operator set. Ask again when there is room."},
 };
 
 }  // namespace

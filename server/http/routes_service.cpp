@@ -83,6 +83,8 @@ HttpReply metrics(RouteContext& context, RouteCall&) {
     if (slash != std::string::npos)
       text += "lightkiln_jobs{kind=\"" + name.substr(0, slash) + "\",state=\"" +
               name.substr(slash + 1) + "\"}" + value;
+    else if (name == "events")  // numbers of events only grow
+      totals += "# TYPE lightkiln_events_total counter\nlightkiln_events_total" + value;
     else
       totals += "# TYPE lightkiln_" + name + " gauge\nlightkiln_" + name + value;
   }

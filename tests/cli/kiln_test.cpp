@@ -132,6 +132,59 @@ TEST(Kiln, ExitFollowsTheProblem) {
   EXPECT_EQ(cli::exit_code(Error(ErrorCode::unavailable, "x")), cli::kUnreachable);
 }
 
+TEST(Kiln, BakeAndFetchEndWithTheirCodes) {
+  test::TemporaryFolder folder;
+  const std::string out = (folder.path() / "out").string();
+  const std::string order = (folder.path() / "order.json").string();
+  std::ofstream(order) << R"({"kind":"ambient_occlusion","inputs":{}})";
+  ScriptedServer closed(always(problem("unauthorized", "A token is needed.")));
+  EXPECT_EQ(kiln_with(closed, {"bake", order, "-o", out}).code, cli::kUnauthorized);
+  EXPECT_EQ(closed.requests().size(), 1u) << "a refusal is not repeated";
+  ScriptedServer gone(always(http_answer(200, write_job(job_in("cancelled")))));
+  EXPECT_EQ(kiln_with(gone, {"fetch", "01JOB", "-o", out}).code, cli::kCancelled);
+  EXPECT_FALSE(fs::exists(out));
+
+  JobMessage job = job_in("succeeded");
+  job.artifacts = {{"ao.exr", "image", "image/x-exr", 3, sha256_digest("abc", 3)}};
+  ScriptedServer lying([&](const ScriptedRequest& request) {
+    if (request.path == "/v1/jobs:validate")
+      return http_answer(200, write_validation({"{}", "", {}}));
+    if (request.path == "/v1/jobs") return http_answer(202, write_job(job));
+    if (request.path.ends_with("/artifacts"))
+      return http_answer(200, write_artifact_list("01JOB", job.artifacts));
+    return http_answer(200, "abX");
+  });
+  EXPECT_EQ(kiln_with(lying, {"bake", order, "-o", out}).code, cli::kDigestMismatch);
+  EXPECT_TRUE(fs::is_empty(out));
+}
+
+TEST(Kiln, SpeaksOfChunksOnlyWhereChunksAreBaked) {
+  JobMessage job = job_in("succeeded");
+  job.progress = {0, 4, "chunk", 1, std::nullopt};
+  job.plan_only = true;
+  ScriptedServer server(always(http_answer(200, write_job(job))));
+  const Outcome planned = kiln_with(server, {"show", "01JOB"});
+  EXPECT_EQ(planned.code, 0);
+  EXPECT_EQ(planned.out.find("chunk"), std::string::npos) << planned.out;
+}
+
+TEST(Kiln, SaysThatThereWasNothingToBake) {
+  JobMessage job = job_in("succeeded");
+  job.quality.error.reset();
+  Plan plan;
+  plan.element_unit = "vertex";
+  job.plan_json = write_plan(plan);
+  ScriptedServer server([&](const ScriptedRequest& request) {
+    return http_answer(200, request.path.ends_with("/artifacts") ? write_artifact_list("01JOB", {})
+                                                                 : write_job(job));
+  });
+  test::TemporaryFolder folder;
+  const Outcome outcome = kiln_with(server, {"fetch", "01JOB", "-o", folder.path().string()});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("0 vertices: there was nothing to bake"), std::string::npos);
+  EXPECT_EQ(outcome.out.find("not known"), std::string::npos);
+}
+
 TEST(Kiln, SaysThatAnotherServiceAnswered) {
   ScriptedServer server(always(http_answer(200, "<html></html>", "text/html")));
   EXPECT_EQ(kiln_with(server, {"show", "01JOB"}).code, cli::kUnreachable);
@@ -484,6 +537,9 @@ TEST(Bake, SaysWhyThePrivateDaemonDidNotStart) {
 TEST(Text, IsReadable) {
   EXPECT_EQ(cli::format_count(1234567), "1 234 567");
   EXPECT_EQ(cli::format_count(12), "12");
+  EXPECT_EQ(cli::format_units(0, "vertex"), "0 vertices");
+  EXPECT_EQ(cli::format_units(1, "vertex"), "1 vertex");
+  EXPECT_EQ(cli::format_units(1234, "probe"), "1 234 probes");
   EXPECT_EQ(cli::format_seconds(200), "3 min 20 s");
   EXPECT_EQ(cli::format_seconds(7500), "2 h 05 min");
   EXPECT_EQ(cli::printable("a\x1b[1mb\n\xC2\x9B\xC3\xA9"), "a?[1mb??\xC3\xA9");

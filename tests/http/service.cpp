@@ -26,17 +26,16 @@ FenceLimits Service::roomy() {
 
 namespace {
 
-StoreOptions store_in(const TemporaryFolder& folder) {
-  StoreOptions options;
+StoreOptions store_in(const TemporaryFolder& folder, StoreOptions options) {
   options.directory = folder.path() / "store";
   return options;
 }
 
 }  // namespace
 
-Service::Service(FenceLimits limits, ApiOptions options)
+Service::Service(FenceLimits limits, ApiOptions options, StoreOptions kept)
     : log(LogLevel::error),
-      store(open_sqlite_store(store_in(folder))),
+      store(open_sqlite_store(store_in(folder, std::move(kept)))),
       api(*store, log, std::move(options)),
       fence(limits, api.application()),
       port(fence.listen("127.0.0.1", 0)) {}

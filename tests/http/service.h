@@ -16,7 +16,7 @@ namespace lightkiln::test {
 
 class Service {
  public:
-  explicit Service(FenceLimits limits = roomy(), ApiOptions options = {});
+  explicit Service(FenceLimits limits = roomy(), ApiOptions options = {}, StoreOptions kept = {});
   ~Service();
 
   // Limits of connections that a test from one address does not meet.

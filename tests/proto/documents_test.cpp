@@ -259,8 +259,8 @@ TEST(Problem, TableHasEveryErrorCodeOnceWithAStatus) {
     EXPECT_GT(std::string(kind.title).size(), 3u);
     EXPECT_GT(std::string(kind.meaning).size(), 10u);
   }
-  for (const int status : {400, 401, 403, 404, 405, 408, 409, 411, 412, 413, 414, 415,
-                           416, 417, 421, 422, 429, 431, 500, 501, 503, 505, 507}) {
+  for (const int status : {400, 401, 403, 404, 405, 408, 409, 411, 413, 414, 415,
+                           416, 417, 421, 422, 429, 431, 500, 503, 505, 507}) {
     bool found = false;
     for (const ProblemKind& kind : problem_kinds()) found = found || kind.status == status;
     EXPECT_TRUE(found) << status;

@@ -27,6 +27,17 @@ bool stands_already(const fs::path& path, const ArtifactMessage& artifact) {
   return sha256_file(path).digest == artifact.digest;
 }
 
+void print_accuracy(const JobMessage& job) {
+  const Plan plan = job.plan_json.empty() ? Plan{} : read_plan(job.plan_json);
+  if (!job.plan_json.empty() && plan.elements == 0) {
+    std::cout << printable(format_units(0, plan.element_unit)) << ": there was nothing to bake";
+    return;
+  }
+  std::cout << "error " << (job.quality.error ? format_error(*job.quality.error) : "not known")
+            << " of " << format_error(job.quality.target) << " ordered";
+  if (!job.quality.unit.empty()) std::cout << " (" << printable(job.quality.unit) << ")";
+}
+
 }  // namespace
 
 std::vector<ArtifactMessage> fetch_artifacts(Session& session, const JobMessage& job,
@@ -61,9 +72,7 @@ void print_result(const JobMessage& job, const std::vector<ArtifactMessage>& art
     table.rows.push_back({printable(artifact.name), format_count(artifact.bytes),
                           printable(artifact.digest.substr(0, 19))});
   print_table(std::cout, table);
-  std::cout << "error " << (job.quality.error ? format_error(*job.quality.error) : "not known")
-            << " of " << format_error(job.quality.target) << " ordered";
-  if (!job.quality.unit.empty()) std::cout << " (" << printable(job.quality.unit) << ")";
+  print_accuracy(job);
   if (job.started_ms > 0 && job.finished_ms >= job.started_ms)
     std::cout << "; time "
               << format_seconds(static_cast<double>(job.finished_ms - job.started_ms) / 1000)

@@ -26,8 +26,9 @@ void print_prices(const Plan& plan) {
 }
 
 void print_plan(const Plan& plan) {
-  std::cout << kind_name(plan.kind) << ": " << format_count(plan.elements) << " elements ("
-            << printable(plan.element_unit) << ") in " << plan.chunks.size() << " chunks, at most "
+  std::cout << kind_name(plan.kind) << ": "
+            << printable(format_units(plan.elements, plan.element_unit)) << " in "
+            << format_units(plan.chunks.size(), "chunk") << ", at most "
             << format_count(plan.max_samples) << " samples each, "
             << format_seconds(plan.predicted_s) << " predicted\n\n";
   print_effects(plan);

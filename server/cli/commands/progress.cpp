@@ -37,7 +37,7 @@ std::string progress_sentence(const JobMessage& job) {
   text << (running ? job.stage : job.state);
   if (running)
     text << ' ' << std::lround(std::clamp(job.progress.fraction, 0.0, 1.0) * 100) << " %";
-  if (job.progress.total > 0)
+  if (job.progress.total > 0 && !job.plan_only)
     text << ", " << job.progress.done << " of " << job.progress.total << ' ' << job.progress.unit
          << 's';
   if (job.quality.error)

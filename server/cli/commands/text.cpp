@@ -60,6 +60,12 @@ std::string format_count(uint64_t count) {
   return digits;
 }
 
+std::string format_units(uint64_t count, const std::string& unit) {
+  std::string plural = unit + 's';
+  if (unit.ends_with("ex")) plural = unit.substr(0, unit.size() - 2) + "ices";
+  return format_count(count) + ' ' + (count == 1 ? unit : plural);
+}
+
 void print_table(std::ostream& out, const Table& table) {
   std::vector<size_t> widths;
   for (const std::string& name : table.header) widths.push_back(width(name));

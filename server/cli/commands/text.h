@@ -16,6 +16,9 @@ std::string format_seconds(double seconds);  // "0.42 s", "3 min 20 s", "2 h 05 
 std::string format_error(double error);      // three digits: "0.0123"
 std::string format_count(uint64_t count);    // "12 345 678"
 
+// A count with its noun: "1 vertex", "0 vertices", "2 chunks".
+std::string format_units(uint64_t count, const std::string& unit);
+
 struct Table {
   std::vector<std::string> header;
   std::vector<bool> right;  // align to the right, by column

@@ -1,0 +1,42 @@
+// A service that is not well, and the words it has for that.
+
+#include <cstdint>
+#include <set>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "proto/problem.h"
+#include "server/http/problems.h"
+#include "tests/http/raw_client.h"
+#include "tests/http/service.h"
+
+namespace lightkiln::test {
+namespace {
+
+TEST(Problems, EveryProblemOfTheHttpLayerCanBeRaised) {
+  std::set<std::string> raised = {"malformed_json"};  // by problem_from_faults
+  for (int i = 0; i <= static_cast<int>(ErrorCode::internal); ++i)
+    raised.insert(error_code_name(static_cast<ErrorCode>(i)));
+  for (int status = 400; status < 600; ++status) raised.insert(http_problem_code(status));
+  for (const ProblemKind& kind : problem_kinds())
+    EXPECT_TRUE(raised.contains(kind.code)) << kind.code;
+}
+
+TEST(Health, AServiceWhoseDiskIsFullIsNotReadyAndSaysSo) {
+  StoreOptions full;
+  full.min_free_bytes = UINT64_MAX;
+  Service service(Service::roomy(), {}, full);
+  for (const char* target : {"/readyz", "/readyz?verbose"}) {
+    const RawReply reply = get(service.port, target);
+    EXPECT_EQ(reply.status, 503);
+    EXPECT_NE(reply.header("retry-after"), "");
+    EXPECT_NE(read_problem(reply.body).detail.find("disk"), std::string::npos) << reply.body;
+  }
+  EXPECT_EQ(get(service.port, "/livez").status, 200);
+  EXPECT_NE(get(service.port, "/metrics").body.find("lightkiln_store_writable 0\n"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace lightkiln::test
