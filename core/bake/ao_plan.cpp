@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdio>
 #include <set>
 
 #include "core/bake/ao_state.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/base/statistics.h"
+#include "core/base/text.h"
 #include "core/trace/texture.h"
 
 namespace lightkiln {
@@ -20,12 +20,6 @@ constexpr uint64_t kFirstSamples = 256;  // 16 replicates of 16 points
 constexpr int kPilotRounds = 4;          // 256, 512, 1024 and 2048 samples
 constexpr uint64_t kPilotGroups = 64;
 constexpr uint64_t kPilotGroupSize = 8;
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
 
 // Runs of neighbouring vertices from all over the scene: a random sample of the work, read from
 // memory in the order in which the bake will read it. Ascending, without repeats.
@@ -157,11 +151,11 @@ Effect max_distance_effect(const AoState& state) {
   const bool active = openness_parameters(state).max_distance != INFINITY;
   if (!active)
     return {"max_distance", false,
-            "The scene's diagonal is " + number(world) + ", so nothing lies beyond " +
-                number(*p.max_distance) + ".",
+            "The scene's diagonal is " + short_number(world) + ", so nothing lies beyond " +
+                short_number(*p.max_distance) + ".",
             0};
   return {"max_distance", true,
-          "Surfaces farther than " + number(*p.max_distance) + " count as open sky.", 1};
+          "Surfaces farther than " + short_number(*p.max_distance) + " count as open sky.", 1};
 }
 
 Effect certificate_effect(const OpennessKernel& kernel) {
@@ -178,7 +172,7 @@ Effect falloff_effect(const AoState& state, const OpennessKernel& kernel) {
     return {"falloff", false, "The falloff is none: occlusion is a yes or no.", 0};
   std::string reason = "A hit counts the less, the farther it lies.";
   if (p.falloff == Falloff::exponential)
-    reason += " Rays end at " + number(kernel.reach() / state.scene.normalisation.scale()) +
+    reason += " Rays end at " + short_number(kernel.reach() / state.scene.normalisation.scale()) +
               ", past which a hit could change the result by less than 6e-8.";
   return {"falloff", true, reason, largest_falloff(state)};
 }
@@ -225,7 +219,7 @@ void price(const AoState& state, const Pilot& pilot, Plan* plan) {
     plan->max_samples = samples_in_time(pilot, plan->elements, target, most, *limit);
     if (predict_seconds(pilot, plan->elements, target, plan->max_samples) > *limit)
       plan->warnings.push_back("Even 64 samples a vertex may take longer than the " +
-                               number(*limit) + " seconds that max_seconds allows.");
+                               short_number(*limit) + " seconds that max_seconds allows.");
   }
   plan->min_samples = std::min(kFirstSamples, plan->max_samples);
   plan->predicted_s = predict_seconds(pilot, plan->elements, target, plan->max_samples);

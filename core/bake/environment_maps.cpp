@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <mutex>
 
 #include "core/bake/environment_outputs.h"
 #include "core/bake/kitchen.h"
 #include "core/base/parallel.h"
+#include "core/base/text.h"
 #include "core/environment/dfg.h"
 #include "core/environment/resample.h"
 #include "core/image/decode.h"
@@ -65,12 +65,6 @@ std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_m
 
 namespace {
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
-
 Effect output_effect(const char* name, bool ordered, const std::string& reason) {
   if (!ordered) return {name, false, "Not ordered.", 0};
   return {name, true, reason, 1};
@@ -93,8 +87,8 @@ Effect variation_effect(const EnvironmentMapsState& state) {
     return {"environment_variation", false, "No output that depends on the light is ordered.", 0};
   }
   return {"environment_variation", true,
-          "Radiance varies over the map: its standard deviation is " + number(state.light.spread) +
-              " of its mean.",
+          "Radiance varies over the map: its standard deviation is " +
+              short_number(state.light.spread) + " of its mean.",
           state.light.spread};
 }
 
@@ -112,7 +106,7 @@ Effect bright_effect(const EnvironmentMapsState& state) {
   }
   return {"bright_texels", true,
           std::to_string(state.light.bright.size()) + " texels hold " +
-              number(100 * state.light.bright_share) +
+              short_number(100 * state.light.bright_share) +
               " % of the light: what the band limits cut off them is added in closed form.",
           bound};
 }
@@ -135,7 +129,7 @@ std::vector<Effect> list_effects(const EnvironmentMapsState& state) {
   for (size_t i = 0; i < state.outputs.size(); ++i) {
     if (state.outputs[i].kind != OutputKind::level || i >= state.lobes.size()) continue;
     if (state.lobes[i].bands > 0)
-      bands += (bands.empty() ? "" : ", ") + number(state.lobes[i].bands);
+      bands += (bands.empty() ? "" : ", ") + short_number(state.lobes[i].bands);
   }
   return {variation_effect(state),
           bright_effect(state),
@@ -348,7 +342,7 @@ void add_image(const EnvironmentOutput& output, double bound, const Image& image
   }
   const std::string name = "prefilter_" + std::to_string(output.index) + ".exr";
   attributes["lightkiln.quantity"] = "radiance prefiltered with GGX, n = v = r";
-  attributes["lightkiln.roughness"] = number(output.roughness);
+  attributes["lightkiln.roughness"] = short_number(output.roughness);
   assembly->artifacts.push_back(cube_artifact(name, image, attributes));
   document->prefilter.push_back({name, output.size, output.roughness, bound});
 }

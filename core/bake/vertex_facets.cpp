@@ -6,17 +6,18 @@
 #include <cmath>
 
 #include "core/base/random.h"
+#include "core/scene/normals.h"
 
 namespace lightkiln {
 
 namespace {
 
-// Doubled area vector, from the corner with the lowest index so that turning the winding round
-// changes its sign and nothing else.
-Vec3d doubled_area(const SurfaceMesh& mesh, std::array<uint32_t, 3> t) {
+// doubled_area() of a triangle, from the corner with the lowest index so that turning the winding
+// round changes its sign and nothing else.
+Vec3d area_by_index(const SurfaceMesh& mesh, std::array<uint32_t, 3> t) {
   std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
-  const Vec3d a = to_double(mesh.positions[t[0]]);
-  return cross(to_double(mesh.positions[t[1]]) - a, to_double(mesh.positions[t[2]]) - a);
+  return doubled_area(to_double(mesh.positions[t[0]]), to_double(mesh.positions[t[1]]),
+                      to_double(mesh.positions[t[2]]));
 }
 
 // What a ray's start may be off by, on each axis, before it must not see its own triangle: the
@@ -46,7 +47,7 @@ double inset_share(double lift, double least_height) {
 
 bool make_facet(const SurfaceMesh& mesh, const std::array<uint32_t, 3>& triangle, int corner,
                 const Vec3& toward, Facet* facet) {
-  const Vec3d area = doubled_area(mesh, triangle);
+  const Vec3d area = area_by_index(mesh, triangle);
   const double size = length(area);
   if (!(size > 0)) return false;
   Vec3d normal = area / size;

@@ -1,19 +1,15 @@
 #include "core/trace/effects.h"
 
 #include <algorithm>
-#include <cstdio>
+
+#include "core/base/text.h"
 
 namespace lightkiln {
 
 namespace {
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
 std::string percent(double part, double whole) {
-  return number(whole > 0 ? 100 * part / whole : 0) + " %";
+  return short_number(whole > 0 ? 100 * part / whole : 0) + " %";
 }
 
 const char* punctual_name(int kind) {
@@ -114,8 +110,8 @@ class Decision {
   void add_light(const char* name, const std::string& what, double bound) {
     if (negligible(bound)) {
       add(name, false,
-          what + ", but changes no result by more than " + number(bound) + ", under " +
-              number(100 * kNegligibleShare) + " % of the ordered error.",
+          what + ", but changes no result by more than " + short_number(bound) + ", under " +
+              short_number(100 * kNegligibleShare) + " % of the ordered error.",
           bound);
     } else {
       add(name, true, what + ".", bound);
@@ -124,9 +120,10 @@ class Decision {
 
   void lights() {
     if (survey_.environment) {
-      add_light("environment",
-                "The environment shines with mean luminance " + number(survey_.environment_mean),
-                bounds_.environment());
+      add_light(
+          "environment",
+          "The environment shines with mean luminance " + short_number(survey_.environment_mean),
+          bounds_.environment());
     } else {
       add("environment", false, "There is no environment, or it is black.", 0);
     }
@@ -138,7 +135,8 @@ class Decision {
           0);
     } else {
       add("environment_variation", true,
-          "The brightest texel is " + number(survey_.environment_max / survey_.environment_mean) +
+          "The brightest texel is " +
+              short_number(survey_.environment_max / survey_.environment_mean) +
               " times the mean, so directions are drawn by importance.",
           bounds_.environment());
     }
@@ -204,7 +202,7 @@ class Decision {
     const double left = truncation_bound(survey_, order_, k);
     plan_.truncation_bound = left;
     plan_.selection.max_bounces = k;
-    const std::string albedo = "the largest albedo is " + number(survey_.max_albedo);
+    const std::string albedo = "the largest albedo is " + short_number(survey_.max_albedo);
     std::string reason;
     if (k == 0) {
       reason = order_.max_bounces ? "No bounce was ordered; " + albedo + "."
@@ -212,14 +210,14 @@ class Decision {
     } else {
       reason = std::to_string(k) + (k == 1 ? " bounce" : " bounces") +
                (order_.max_bounces ? " ordered; " : "; ") + albedo +
-               ", so that later ones add at most " + number(left) + ".";
+               ", so that later ones add at most " + short_number(left) + ".";
     }
     add("diffuse_bounces", k > 0, std::move(reason), k > 0 ? bounds_.reflected() : left);
     if (!order_.max_bounces && left > 0.5 * order_.target_error) {
       plan_.warnings.push_back("Bounces end at " + std::to_string(kMostBounces) +
-                               ", where the bound on what is lost (" + number(left) +
+                               ", where the bound on what is lost (" + short_number(left) +
                                ") is above half of the ordered error: the largest albedo is " +
-                               number(survey_.max_albedo) + ".");
+                               short_number(survey_.max_albedo) + ".");
     }
   }
 

@@ -1,4 +1,5 @@
 // Ambient occlusion through the front door: a GLB goes in, bytes come out.
+// Tags beside tests are explained in tests/support/hard_cases.h.
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,5 @@
 // Openness against closed forms: scenes whose answer is a formula.
+// Tags beside tests are explained in tests/support/hard_cases.h.
 
 #include "core/bake/openness.h"
 
@@ -223,6 +224,41 @@ TEST(Openness, ExponentialFalloffUnderACeiling) {
               kTolerance);
 }
 
+TEST(Openness, ExponentialFalloffWithAFiniteReach) {
+  // A ceiling at h is seen within the reach D by cosines x above c = h / D:
+  //   1 - int_c^1 2 x e^(-h / (f x)) dx, by a fine midpoint rule.
+  const double h = 0.6, f = 0.8, D = 1;
+  double expected = 1;
+  constexpr int kSteps = 200000;
+  for (int i = 0; i < kSteps; ++i) {
+    const double x = h / D + (1 - h / D) * (i + 0.5) / kSteps;
+    expected -= 2 * x * std::exp(-h / (f * x)) * (1 - h / D) / kSteps;
+  }
+  OpennessParameters p = thorough();
+  p.falloff = Falloff::exponential;
+  p.falloff_distance = f;
+  p.max_distance = D;
+  const MeshData scene = merged(floor_plane(100), ceiling(0.6f));
+  EXPECT_NEAR(openness_of(scene, {{0, 0, 0}}, p), expected, kTolerance);
+  p.max_distance = INFINITY;
+  EXPECT_LT(openness_of(scene, {{0, 0, 0}}, p), expected - 0.05);  // the reach matters here
+}
+
+TEST(Openness, UniformDistributionWithAFalloffUnderACeiling) {
+  // Uniform directions have uniform cosines x. Hits lie at d = h / x, for x from c = h / D to 1:
+  //   linear     c + int_c^1 c / x dx = c (1 - ln c)
+  //   quadratic  c + int_c^1 c^2 / x^2 dx = c + c^2 (1 / c - 1) = c (2 - c)
+  const double c = 0.6;
+  OpennessParameters p = thorough();
+  p.distribution = Distribution::uniform;
+  p.max_distance = 1;
+  const MeshData scene = merged(floor_plane(100), ceiling(0.6f));
+  p.falloff = Falloff::linear;
+  EXPECT_NEAR(openness_of(scene, {{0, 0, 0}}, p), c * (1 - std::log(c)), kTolerance);
+  p.falloff = Falloff::quadratic;
+  EXPECT_NEAR(openness_of(scene, {{0, 0, 0}}, p), c * (2 - c), kTolerance);
+}
+
 TEST(Openness, WallWithinReach) {  // A14, A15
   const double a = 0.5, D = 1;
   const double psi = std::acos(a / D);
@@ -246,6 +282,22 @@ TEST(Openness, UniformDistributionAveragesOverSolidAngle) {
   EXPECT_NEAR(openness_of(wall_scene, {{0, 0, 0}}, p), 0.5, kTolerance);
   const MeshData sphere = merged(floor_plane(10), make_sphere({0, 2, 0}, 1, 128, 256));
   EXPECT_NEAR(openness_of(sphere, {{0, 0, 0}}, p), std::cos(std::asin(0.5)), kTolerance);
+}
+
+// Why facets look out about their own normals: just inside a face of a coarse sphere, about the
+// smooth normal of its corner, some rays start into the solid, and the surface darkens although
+// nothing stands above it.
+TEST(Openness, AboutShadingNormalsAConvexSolidWouldDarken) {  // G10, positive control
+  const MeshData sphere = make_sphere({0, 0, 0}, 1, 8, 16);
+  double least = 1;
+  for (size_t i = 0; i < sphere.triangles.size(); i += 17) {
+    const auto& t = sphere.triangles[i];
+    const Vec3d p = to_double(sphere.positions[t[0]]);
+    const Vec3d a = to_double(sphere.positions[t[1]]), b = to_double(sphere.positions[t[2]]);
+    const Place place{p * 0.98 + a * 0.01 + b * 0.01, to_double(sphere.normals[t[0]])};
+    least = std::min(least, openness_of(sphere, place));
+  }
+  EXPECT_LT(least, 0.995);
 }
 
 TEST(Openness, ErrorBarsCoverTheTruth) {  // T3

@@ -1,4 +1,5 @@
 // Rays that must never reach Embree, whose assertions would end the process.
+// Tags beside tests are explained in tests/support/hard_cases.h.
 
 #include <cmath>
 #include <cstring>

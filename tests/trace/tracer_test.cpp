@@ -1,3 +1,5 @@
+// Tags beside tests are explained in tests/support/hard_cases.h.
+
 #include "core/trace/tracer.h"
 
 #include <cmath>
