@@ -102,7 +102,7 @@ Spending spend(const Pilot& pilot, double target, uint64_t cap) {
       const bool seen = round < pilot.errors.size();
       spending.extrapolated |= !seen;
       error = seen ? pilot.errors[round][e] : error * std::exp2(-pilot.beta);
-      if (samples >= cap || OpennessKernel::look_quantile(look) * error <= target) break;
+      if (samples >= cap || look_quantile(look) * error <= target) break;
     }
     sum += static_cast<double>(std::min(samples, cap));
   }

@@ -250,8 +250,7 @@ OpennessEstimate OpennessKernel::Impl::judge(const Sums& sums) const {
   estimate.standard_error = bounded_standard_error(means, samples);
   estimate.half_width = quantile_95 * estimate.standard_error;
   estimate.status = sums.rejected ? AccuracyStatus::suspicious
-                    : OpennessKernel::look_quantile(sums.level) * estimate.standard_error <=
-                            parameters.target_error
+                    : look_quantile(sums.level) * estimate.standard_error <= parameters.target_error
                         ? AccuracyStatus::converged
                         : AccuracyStatus::budget_limited;
   return estimate;
@@ -270,16 +269,6 @@ std::vector<RayPacket16> OpennessKernel::packets(const OpennessElement& element,
 
 double OpennessKernel::reach() const {
   return reach_of(impl_->parameters);
-}
-
-double OpennessKernel::look_quantile(int look) {
-  static const std::array<double, 32> table = [] {
-    std::array<double, 32> values{};
-    for (int k = 1; k < 32; ++k)
-      values[static_cast<size_t>(k)] = student_t(1 - spent_alpha(0.05, k), kReplicates - 1);
-    return values;
-  }();
-  return table[static_cast<size_t>(std::clamp(look, 1, 31))];
 }
 
 void OpennessKernel::estimate(std::span<const OpennessElement> elements,

@@ -77,8 +77,6 @@ class OpennessKernel {
 
   // The distance past which no hit can change the result, in scene units.
   double reach() const;
-  // Student's quantile for the k-th look (k = 1, 2, ...) of the stopping rule.
-  static double look_quantile(int look);
 
  private:
   struct Impl;

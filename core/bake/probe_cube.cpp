@@ -243,7 +243,7 @@ void CubeSampling::look_directly(bool lamp, uint32_t from, uint32_t to, Progress
       Texel& slot = slots_[found[i].slot];
       slot.sum += radiance;
       slot.luminance[replicate] += luminance(radiance);
-      slot.largest = std::max(slot.largest, luminance(radiance));
+      slot.tail.add(luminance(radiance));
       if (bands_ == 0) continue;
       const Vec3d direction = to_double(found[i].light.direction);
       sh_evaluate_basis(direction, bands_, basis);
@@ -282,7 +282,7 @@ void CubeSampling::sample_texel(size_t i, uint32_t from, uint32_t to, Progress& 
           to_double(scene_.sample({origin_, to_float(point.direction)}, key, k, block->counters,
                                   looks ? first_density(point.direction) : 0));
       sum += radiance;
-      slot.largest = std::max(slot.largest, luminance(radiance));
+      slot.tail.add(luminance(radiance));
       harmonics.add(point, radiance);
     }
     slot.sum += sum;
@@ -376,7 +376,7 @@ bool CubeSampling::suspicious() const {
   for (size_t i = 0; i < slots_.size(); ++i) {
     const double half = half_width(i), part = order_.shares[i] * half * half;
     whole += part;
-    if (slots_[i].largest > 0.1 * luminance(slots_[i].sum)) doubtful += part;
+    if (slots_[i].tail.suspicious()) doubtful += part;
   }
   return doubtful > 0.5 * whole;
 }

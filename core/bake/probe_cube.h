@@ -52,8 +52,8 @@ class CubeSampling {
   double mean_luminance() const;
   // Root mean square over the sphere of the texels' 95 % half-widths of luminance.
   double error() const;
-  // True when most of the squared error comes from texels where one sample holds over a tenth of
-  // the sum: such an estimate of variance cannot be trusted.
+  // True when most of the squared error comes from texels whose samples' tail is heavy (TailGuard):
+  // such an estimate of variance cannot be trusted.
   bool suspicious() const;
   // Radiance, and the largest 95 % half-width of a coefficient's luminance relative to L00's.
   ShRgb harmonics() const;
@@ -64,7 +64,7 @@ class CubeSampling {
   struct Texel {
     Vec3d sum;
     double luminance[kReplicates] = {};  // sums
-    double largest = 0;
+    TailGuard tail;
   };
   struct Block {
     RayCounters counters;

@@ -89,6 +89,8 @@ ProbeResult bake_probe(ProbesState& state, const RadianceScene& scene, const Cub
 
   CubeSampling sampling(scene, texels, origin, key, parameters.sh.bands, state.grants.threads);
   double done = 0;
+  int looks = 0;
+  bool reached = false;
   do {
     const double next = 0.5 * (1 + done);
     Round round = sampling.advance(progress, progress_begin + progress_width * done,
@@ -96,13 +98,16 @@ ProbeResult bake_probe(ProbesState& state, const RadianceScene& scene, const Cub
     result.error = sampling.error() / plan.reference_luminance;
     round.error_sum_sq = result.error * result.error;
     round.error_max = result.error;
-    round.converged = result.error <= target ? 1 : 0;
+    // Before the fewest samples nothing is decided, so nothing is spent.
+    if (sampling.samples() >= plan.min_samples) ++looks;
+    reached = result.error * look_widening(looks) <= target;
+    round.converged = reached ? 1 : 0;
     report->rounds.push_back(round);
     done = std::max(next, share_done(result.error, target));
   } while (sampling.samples() < plan.min_samples ||
-           (result.error > target && 2 * sampling.samples() <= plan.max_samples));
+           (!reached && 2 * sampling.samples() <= plan.max_samples));
 
-  const bool suspicious = sampling.suspicious(), limited = result.error > target;
+  const bool suspicious = sampling.suspicious(), limited = !reached;
   result.accuracy = suspicious ? AccuracyStatus::suspicious
                     : limited  ? AccuracyStatus::budget_limited
                                : AccuracyStatus::converged;

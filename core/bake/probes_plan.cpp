@@ -37,10 +37,16 @@ class Prediction {
       beta_ = std::clamp(std::log(first / error_) / std::log(ratio), 0.5, 1.5);
     }
   }
-  // Doublings end at a power of two.
-  uint64_t samples_for(double error) const {
-    const double wanted = samples_ * std::pow(error_ / error, 1 / beta_);
-    return std::bit_ceil(static_cast<uint64_t>(std::clamp(wanted, 1.0, 0x1p40)));
+  double error(uint64_t samples) const {
+    return error_ * std::pow(samples_ / static_cast<double>(samples), beta_);
+  }
+  // Where the stopping rule's doublings from `fewest` end.
+  uint64_t samples_for(double target, uint64_t fewest, uint64_t most) const {
+    uint64_t samples = fewest;
+    for (int look = 1; 2 * samples <= most; ++look, samples *= 2) {
+      if (error(samples) * look_widening(look) <= target) break;
+    }
+    return samples;
   }
   double seconds(uint64_t samples) const {
     return seconds_per_sample_ * static_cast<double>(samples);
@@ -113,9 +119,14 @@ Plan probes_plan(ProbesState& state, Progress& progress) {
     plan.max_samples = std::clamp(prediction.samples_within(*state.spec.accuracy.max_seconds),
                                   kFewestSamples, plan.max_samples);
     plan.min_samples = std::min(plan.min_samples, plan.max_samples);
+    if (prediction.seconds(plan.min_samples) > *state.spec.accuracy.max_seconds) {
+      plan.warnings.push_back("Even " + std::to_string(plan.min_samples) +
+                              " samples a texel, the fewest, may take longer than max_seconds "
+                              "allows.");
+    }
   }
-  const uint64_t samples = std::clamp(prediction.samples_for(target_error(state.spec)),
-                                      plan.min_samples, plan.max_samples);
+  const uint64_t samples =
+      prediction.samples_for(target_error(state.spec), plan.min_samples, plan.max_samples);
   plan.predicted_s = prediction.seconds(samples);
   plan.chunks = split_chunks(plan.elements, plan.predicted_s, state.grants.chunk_seconds);
   plan.pilot_s = wall_seconds() - start;

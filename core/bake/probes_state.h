@@ -9,6 +9,7 @@
 
 #include "core/bake/kitchen.h"
 #include "core/bake/probe_surroundings.h"
+#include "core/base/statistics.h"
 #include "core/trace/radiance.h"
 
 namespace lightkiln {
@@ -40,6 +41,11 @@ inline constexpr uint64_t kPilotStream = 2;
 
 // The selection that a plan stands for.
 EffectSelection plan_selection(const ProbesState& state, const Plan& plan);
+
+// What the stopping rule demands beyond a plain 95 % half-width at its k-th look (0 counts as 1).
+inline double look_widening(int look) {
+  return look_quantile(look) / student_t(0.95, kReplicates - 1);
+}
 
 // One probe's result, as chunk bytes carry it.
 struct ProbeResult {

@@ -1,6 +1,7 @@
 #include "core/base/statistics.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace lightkiln {
@@ -141,6 +142,16 @@ double bounded_half_width(std::span<const double> replicate_means, uint64_t tota
 
 double spent_alpha(double alpha, int look) {
   return alpha / (static_cast<double>(look) * (look + 1));
+}
+
+double look_quantile(int look) {
+  static const std::array<double, 32> table = [] {
+    std::array<double, 32> values{};
+    for (int k = 1; k < 32; ++k)
+      values[static_cast<size_t>(k)] = student_t(1 - spent_alpha(0.05, k), kReplicates - 1);
+    return values;
+  }();
+  return table[static_cast<size_t>(std::clamp(look, 1, 31))];
 }
 
 void TailGuard::add(double value) {

@@ -57,4 +57,9 @@ double tree_sum(std::span<const float> values);
 // alpha / (k (k + 1)).
 double spent_alpha(double alpha, int look);
 
+// Student's two-sided quantile for kReplicates at the k-th look (k = 1, 2, ..., at most 31) of a
+// rule that stops once this many standard errors are within the target: all looks together spend
+// 5 %.
+double look_quantile(int look);
+
 }  // namespace lightkiln

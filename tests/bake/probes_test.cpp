@@ -303,6 +303,8 @@ TEST(Probes, SecondsPinTheSamples) {
   Progress progress;
   const Plan plan = probes_plan(*state, progress);
   EXPECT_EQ(plan.max_samples, 64u);
+  ASSERT_FALSE(plan.warnings.empty());
+  EXPECT_NE(plan.warnings.back().find("max_seconds"), std::string::npos);
   EXPECT_EQ(plan.prices.size(), 5u);
   for (size_t i = 1; i < 5; ++i) EXPECT_GE(plan.prices[i].seconds, plan.prices[i - 1].seconds);
 }
@@ -348,6 +350,51 @@ TEST(Probes, HeavyTailsAreSuspicious) {
     CubeSampling sampling(*lit.radiance, texels, {0, -0.2f, 0}, 5, 0, 1);
     while (sampling.samples() < 1024) sampling.advance(progress, 0, 1);
     EXPECT_EQ(sampling.suspicious(), !sampled);
+  }
+}
+
+// Stopping on what the samples claim must not spoil the claim: after doublings the true error is
+// within the error told in 95 % of bakes. Texels' mean over all bakes serves as the truth.
+TEST(Probes, StoppingKeepsTheErrorsCoverage) {
+  for (const int size : {1, 8}) {
+    Order order;
+    order.size = size;
+    order.bands = 1;
+    order.max_bounces = 1;
+    order.target = 1;
+    constexpr size_t kBakes = 12;
+    State state = open(colored_room(), {}, order, 2);
+    Progress progress;
+    const Plan plan = probes_plan(*state, progress);
+    const ChunkResult at_once = probes_chunk(*state, plan, {0, 1}, progress);
+    // Less than the fewest samples bring, so that there is something to stop.
+    state->spec.accuracy.target_error = 0.9 * read_all(*state, at_once).at(0).error;
+    const CubeTexels texels = all_texels(size);
+    std::vector<ProbeResult> bakes;
+    std::vector<double> truth(texels.texels.size());
+    size_t doubled = 0;
+    const auto value = [](const ProbeResult& probe, size_t i) {
+      const float* rgb = &probe.radiance[3 * i];
+      return luminance(to_double(Vec3{rgb[0], rgb[1], rgb[2]}));
+    };
+    for (size_t run = 0; run < kBakes; ++run) {
+      state->spec.seed = 100 + run;
+      bakes.push_back(read_all(*state, probes_chunk(*state, plan, {0, 1}, progress)).at(0));
+      EXPECT_EQ(bakes.back().accuracy, AccuracyStatus::converged);
+      doubled += bakes.back().samples > plan.min_samples;
+      for (size_t i = 0; i < truth.size(); ++i) truth[i] += value(bakes.back(), i) / kBakes;
+    }
+    size_t covered = 0;
+    for (const ProbeResult& probe : bakes) {
+      double sum = 0;
+      for (size_t i = 0; i < truth.size(); ++i) {
+        const double off = (value(probe, i) - truth[i]) / plan.reference_luminance;
+        sum += texels.shares[i] * off * off;
+      }
+      covered += std::sqrt(sum) <= probe.error;
+    }
+    EXPECT_GE(covered, kBakes - 1) << size;
+    EXPECT_GE(doubled, kBakes / 2) << size;  // otherwise nothing was stopped
   }
 }
 

@@ -136,25 +136,52 @@ TEST(Statistics, RareEventsAreNotTakenForCertainty) {  // T1
   EXPECT_LT(bounded_half_width(zeros, 1024), 0.005);
 }
 
-TEST(Statistics, HeavyTailsAreCalledSuspicious) {  // T2
-  // X = 1 + 100 Bernoulli(0.005), mean 1.5.
-  int fooled = 0;
-  constexpr int kRuns = 1000;
-  for (int run = 0; run < kRuns; ++run) {
-    TailGuard guard;
-    double sums[kReplicates] = {};
-    constexpr uint64_t n = 1024;
-    for (uint64_t i = 0; i < n; ++i) {
-      const double x = uniform(hash_combine(static_cast<uint64_t>(run), i)) < 0.005 ? 101 : 1;
+// X = 1 + 100 Bernoulli(0.005), mean 1.5, doubled from `fewest` samples until 5 % of the mean is
+// claimed. A run is fooled that claims so, suspects nothing (when it may), and is off by over three
+// times its claim.
+struct TailRun {
+  bool fooled = false;
+  bool suspected = false;  // at the first look
+};
+TailRun tail_run(uint64_t run, uint64_t fewest, bool guarded) {
+  TailGuard guard;
+  double sums[kReplicates] = {};
+  uint64_t taken = 0;
+  TailRun result;
+  for (uint64_t n = fewest; n <= 1u << 14; n *= 2) {
+    for (; taken < n; ++taken) {
+      const double x = uniform(hash_combine(run, taken)) < 0.005 ? 101 : 1;
       guard.add(x);
-      sums[i % kReplicates] += x / (n / kReplicates);
+      sums[taken % kReplicates] += x;
     }
-    double mean = 0;
-    for (const double sum : sums) mean += sum / kReplicates;
-    const bool wrong = std::abs(mean - 1.5) > 3 * replicate_half_width(sums);
-    fooled += wrong && !guard.suspicious();
+    if (n == fewest) result.suspected = guard.suspicious();
+    double means[kReplicates], mean = 0;
+    for (size_t r = 0; r < kReplicates; ++r) {
+      means[r] = sums[r] * kReplicates / static_cast<double>(n);
+      mean += means[r] / kReplicates;
+    }
+    const double half = replicate_half_width(means);
+    if (half > 0.05 * mean) continue;
+    result.fooled = std::abs(mean - 1.5) > 3 * half && !(guarded && guard.suspicious());
+    break;
+  }
+  return result;
+}
+
+// What was never met cannot be suspected, so the guard needs 64 samples in each of 16 replicates:
+// then a tail of one in 200 is met by all but 0.6 % of runs, and told by the guard.
+TEST(Statistics, HeavyTailsAreCalledSuspicious) {  // T2
+  int fooled = 0, unguarded = 0, suspected = 0;
+  constexpr int kRuns = 1000;
+  for (uint64_t run = 0; run < kRuns; ++run) {
+    const TailRun guarded = tail_run(run, 1024, true);
+    fooled += guarded.fooled;
+    suspected += guarded.suspected;
+    unguarded += tail_run(run, 16, false).fooled;
   }
   EXPECT_LE(fooled, 0.05 * kRuns);
+  EXPECT_GE(suspected, 0.9 * kRuns);
+  EXPECT_GE(unguarded, 0.85 * kRuns);  // positive control: 0.995^16 = 92 % meet nothing at first
   TailGuard calm;
   for (uint64_t i = 0; i < 1024; ++i) calm.add(uniform(i));
   EXPECT_FALSE(calm.suspicious());
