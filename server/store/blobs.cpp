@@ -109,7 +109,8 @@ std::string Blobs::Draft::finish() {
 
 bool Blobs::Draft::keep() {
   finish();
-  if (blobs_.has(digest_)) return false;
+  if (blobs_.has_verified(digest_)) return false;
+  const bool known = blobs_.has(digest_);
   fsync_or_stop(fd_, path_);
   const std::string final_path = blobs_.path_of(digest_);
   if (rename(path_.c_str(), final_path.c_str()) != 0)
@@ -118,14 +119,14 @@ bool Blobs::Draft::keep() {
   fsync_folder(fs::path(final_path).parent_path().string());
   const std::lock_guard lock(blobs_.mutex_);
   blobs_.verified_.insert(digest_);
-  return true;
+  return !known;
 }
 
 std::string Blobs::put(std::span<const std::byte> bytes) {
   Sha256 hash;
   hash.append(bytes.data(), bytes.size());
   std::string digest = hash.digest();
-  if (has(digest)) return digest;
+  if (has_verified(digest)) return digest;
   Draft draft(*this);
   draft.append(bytes.data(), bytes.size());
   draft.keep();
@@ -139,6 +140,18 @@ std::string Blobs::path_of(const std::string& digest) const {
 
 bool Blobs::has(const std::string& digest) const {
   return access(path_of(digest).c_str(), F_OK) == 0;
+}
+
+// Whoever renamed the file may not have reached its fsync of the folder yet, so that is done here
+// as well before anything is acknowledged that refers to it.
+bool Blobs::has_verified(const std::string& digest) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!verified_.contains(digest)) return false;
+  }
+  if (!has(digest)) return false;
+  fsync_folder(fs::path(path_of(digest)).parent_path().string());
+  return true;
 }
 
 int Blobs::open(const std::string& digest, uint64_t* size) {

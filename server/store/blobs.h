@@ -32,7 +32,8 @@ class Blobs {
     void append(const void* data, size_t size);
     // Ends the writing and returns the digest.
     std::string finish();
-    // Makes the bytes durable under their digest; false when they were there already.
+    // Makes the bytes durable under their digest, replacing a file that this process has not
+    // verified: it may be damaged. False when there was one already.
     bool keep();
 
    private:
@@ -52,6 +53,8 @@ class Blobs {
   void remove(const std::string& digest);
 
  private:
+  // Present, found whole by this process, and durable under its name.
+  bool has_verified(const std::string& digest);
   std::string path_of(const std::string& digest) const;
   void quarantine(const std::string& digest);
 

@@ -54,6 +54,9 @@ std::optional<JobPosition> next_position(const JobPosition& position, JobEvent e
     case JobEvent::last_chunk_committed:
       if (running && stage == JobStage::bake) return JobPosition{state, JobStage::assemble};
       break;
+    case JobEvent::chunks_lost:
+      if (running && stage == JobStage::assemble) return JobPosition{state, JobStage::bake};
+      break;
     case JobEvent::result_committed:
       if (running && stage == JobStage::assemble)
         return JobPosition{JobState::succeeded, JobStage::done};

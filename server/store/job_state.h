@@ -14,6 +14,7 @@ enum class JobEvent {
   plan_committed,       // of an order that bakes
   plan_only_committed,  // of an order that wants nothing but the plan
   last_chunk_committed,
+  chunks_lost,  // found while assembling: bytes of finished chunks are gone
   result_committed,
   failed,  // a task failed for good
   cancelled,

@@ -80,6 +80,29 @@ void SqliteStore::drop_chunk_bytes(Database& db, const std::string& id,
   db.run("UPDATE tasks SET digest='' WHERE job_id=?1 AND digest<>''", id);
 }
 
+// Finished chunks whose bytes were set aside as damaged, or are gone.
+std::vector<uint64_t> SqliteStore::lost_chunks(Database& db, const std::string& id) {
+  std::vector<uint64_t> lost;
+  Statement rows =
+      db.query("SELECT chunk_index, digest FROM tasks WHERE job_id=?1 AND type=?2 AND state=2", id,
+               static_cast<int>(TaskType::chunk));
+  while (rows.step())
+    if (!blobs_.has(rows.text(1))) lost.push_back(rows.natural(0));
+  return lost;
+}
+
+// They wait for a worker once more, and assembling waits for them; the stage is the caller's.
+void SqliteStore::bake_again(Database& db, const std::string& id,
+                             const std::vector<uint64_t>& chunks) {
+  for (const uint64_t index : chunks)
+    db.run(
+        "UPDATE tasks SET state=0, lease_until_ms=0, digest='', report_json='', elements=0, "
+        "error_sum_sq=0 WHERE job_id=?1 AND type=?2 AND chunk_index=?3",
+        id, static_cast<int>(TaskType::chunk), index);
+  db.run("DELETE FROM tasks WHERE job_id=?1 AND type=?2", id, static_cast<int>(TaskType::assemble));
+  sum_chunks(db, id);
+}
+
 void SqliteStore::sum_chunks(Database& db, const std::string& id) {
   db.run(
       "UPDATE jobs SET chunk_fraction=0, version=?3, reason=CASE WHEN EXISTS(SELECT 1 FROM tasks "

@@ -123,9 +123,7 @@ bool SqliteStore::answer_from_cache(Database& db, const std::string& id,
     source = row.text(0);
   }
   if (!submission.plan_only) {
-    Statement rows = db.query("SELECT digest FROM artifacts WHERE job_id=?1", source);
-    while (rows.step())
-      if (!blobs_.has(rows.text(0))) return false;
+    if (!has_artifacts(db, source)) return false;
     db.run(
         "INSERT INTO artifacts SELECT ?2, position, name, role, media_type, digest, bytes FROM "
         "artifacts WHERE job_id=?1",
@@ -156,22 +154,39 @@ bool SqliteStore::answer_from_cache(Database& db, const std::string& id,
   return true;
 }
 
+bool SqliteStore::has_artifacts(Database& db, const std::string& id) {
+  Statement rows = db.query("SELECT digest FROM artifacts WHERE job_id=?1", id);
+  while (rows.step())
+    if (!blobs_.has(rows.text(0))) return false;
+  return true;
+}
+
+// The job that an equal key and body made before. A key whose job has lost artifacts is forgotten:
+// the order is baked anew, which also restores the bytes that the earlier job refers to.
+std::optional<std::string> SqliteStore::replay(Database& db, const Submission& submission) {
+  if (submission.idempotency_key.empty()) return std::nullopt;
+  db.run("DELETE FROM idempotency WHERE created_ms<?1", wall_clock_ms() - kIdempotencyMs);
+  std::string id;
+  {
+    Statement seen = db.query("SELECT request_digest, job_id FROM idempotency WHERE key=?1",
+                              submission.idempotency_key);
+    if (!seen.step()) return std::nullopt;
+    if (seen.text(0) != submission.request_digest)
+      throw Error(ErrorCode::conflict,
+                  "This Idempotency-Key was used before with another request.");
+    id = seen.text(1);
+  }
+  if (has_artifacts(db, id)) return id;
+  db.run("DELETE FROM idempotency WHERE key=?1", submission.idempotency_key);
+  return std::nullopt;
+}
+
 SubmitResult SqliteStore::submit(const Submission& submission) {
   require_space();
   Writer writer(*this);
   Database& db = writer.db();
   const int64_t now_ms = wall_clock_ms();
-  if (!submission.idempotency_key.empty()) {
-    db.run("DELETE FROM idempotency WHERE created_ms<?1", now_ms - kIdempotencyMs);
-    Statement seen = db.query("SELECT request_digest, job_id FROM idempotency WHERE key=?1",
-                              submission.idempotency_key);
-    if (seen.step()) {
-      if (seen.text(0) != submission.request_digest)
-        throw Error(ErrorCode::conflict,
-                    "This Idempotency-Key was used before with another request.");
-      return {seen.text(1), true};
-    }
-  }
+  if (const auto earlier = replay(db, submission)) return {*earlier, true};
   std::string missing;
   for (const std::string& digest : submission.inputs)
     if (!blobs_.has(digest)) missing += (missing.empty() ? "" : ", ") + digest;
@@ -230,14 +245,7 @@ void SqliteStore::retry(const std::string& id) {
     throw Error(ErrorCode::conflict, std::string("Only a failed or cancelled job can be retried; "
                                                  "this one is ") +
                                          job_state_name(before.state) + ".");
-  std::vector<uint64_t> lost;
-  {
-    Statement rows =
-        db.query("SELECT chunk_index, digest FROM tasks WHERE job_id=?1 AND type=?2 AND state=2",
-                 id, static_cast<int>(TaskType::chunk));
-    while (rows.step())
-      if (!blobs_.has(rows.text(1))) lost.push_back(rows.natural(0));
-  }
+  const std::vector<uint64_t> lost = lost_chunks(db, id);
   db.run("UPDATE tasks SET crashes=0, losses=0 WHERE job_id=?1", id);
   db.run(
       "UPDATE jobs SET error_code='', error_detail='', error_pointer='', finished_ms=0 WHERE "
@@ -245,16 +253,8 @@ void SqliteStore::retry(const std::string& id) {
       id);
   move_job(db, id, JobEvent::retried, kWaitingForWorker);
   if (!lost.empty()) {
-    // Chunks whose bytes were set aside as damaged are baked again, and assembled after that.
-    for (const uint64_t index : lost)
-      db.run(
-          "UPDATE tasks SET state=0, digest='', report_json='', elements=0, error_sum_sq=0 WHERE "
-          "job_id=?1 AND type=?2 AND chunk_index=?3",
-          id, static_cast<int>(TaskType::chunk), index);
-    db.run("DELETE FROM tasks WHERE job_id=?1 AND type=?2", id,
-           static_cast<int>(TaskType::assemble));
+    bake_again(db, id, lost);
     db.run("UPDATE jobs SET stage=?2 WHERE id=?1", id, static_cast<int>(JobStage::bake));
-    sum_chunks(db, id);
   }
   writer.commit();
 }

@@ -57,10 +57,11 @@ class SqliteStore final : public Store {
                    double predicted_s) override;
   void commit_chunk(const Claim& claim, const ChunkCommit& chunk) override;
   std::vector<StoredChunk> load_chunks(const std::string& job_id) override;
+  bool rebake_lost_chunks(const Claim& claim) override;
   void commit_result(const Claim& claim, const std::vector<NewArtifact>& artifacts,
                      const std::string& accuracy_json) override;
   void fail_task(const Claim& claim, const JobError& error, bool crashed) override;
-  void release(const Claim& claim) override;
+  void release(const Claim& claim, const std::string& reason) override;
   void wait_for_work(int64_t wait_ms) override;
 
   StoreHealth health() override;
@@ -88,6 +89,10 @@ class SqliteStore final : public Store {
   void drop_leases(Database& db, const std::string& id);
   bool holds(Database& db, const Claim& claim);
   void expire_dead_workers(Database& db);
+  std::optional<std::string> replay(Database& db, const Submission& submission);
+  bool has_artifacts(Database& db, const std::string& id);  // every one's bytes are there
+  std::vector<uint64_t> lost_chunks(Database& db, const std::string& id);
+  void bake_again(Database& db, const std::string& id, const std::vector<uint64_t>& chunks);
   bool answer_from_cache(Database& db, const std::string& id, const Submission& submission);
   void drop_chunk_bytes(Database& db, const std::string& id, std::vector<std::string>* orphans);
   void remove_orphans(Database& db, const std::vector<std::string>& digests);

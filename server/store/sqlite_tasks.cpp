@@ -100,19 +100,21 @@ std::optional<Claim> SqliteStore::claim(const std::string& worker, const std::st
     {
       const int64_t now_ms = lease_clock_ms();
       Statement preferred = db.query(
-          "SELECT t.job_id, t.type, t.chunk_index, t.state, t.losses FROM jobs j CROSS JOIN tasks "
-          "t "
-          "ON t.job_id=j.id WHERE j.id=?2 AND j.state<2 AND t.state<2 AND (t.state=0 OR "
+          "SELECT t.job_id, t.type, t.chunk_index, t.state, t.losses, j.priority FROM jobs j CROSS "
+          "JOIN tasks t ON t.job_id=j.id WHERE j.id=?2 AND j.state<2 AND t.state<2 AND (t.state=0 "
+          "OR "
           "t.lease_until_ms<=?1) ORDER BY t.type, t.chunk_index LIMIT 1",
           now_ms, prefer_job);
       Statement any = db.query(
-          "SELECT t.job_id, t.type, t.chunk_index, t.state, t.losses FROM jobs j CROSS JOIN tasks "
-          "t "
-          "ON t.job_id=j.id WHERE j.state<2 AND t.state<2 AND (t.state=0 OR t.lease_until_ms<=?1) "
+          "SELECT t.job_id, t.type, t.chunk_index, t.state, t.losses, j.priority FROM jobs j CROSS "
+          "JOIN tasks t ON t.job_id=j.id WHERE j.state<2 AND t.state<2 AND (t.state=0 OR "
+          "t.lease_until_ms<=?1) "
           "ORDER BY j.priority DESC, j.id, t.type, t.chunk_index LIMIT 1",
           now_ms);
-      const bool prefer = preferred.step();
-      if (!prefer && !any.step()) break;
+      // Two walks along an index, where one order by (priority, preferred, id) would sort all
+      // tasks.
+      if (!any.step()) break;
+      const bool prefer = preferred.step() && preferred.integer(5) >= any.integer(5);
       const Statement& row = prefer ? preferred : any;
       claim.emplace();
       claim->job_id = row.text(0);
@@ -242,6 +244,41 @@ std::vector<StoredChunk> SqliteStore::load_chunks(const std::string& job_id) {
   return chunks;
 }
 
+bool SqliteStore::rebake_lost_chunks(const Claim& claim) {
+  Writer writer(*this);
+  Database& db = writer.db();
+  if (claim.type != TaskType::assemble || !holds(db, claim)) return false;
+  const std::vector<uint64_t> lost = lost_chunks(db, claim.job_id);
+  if (lost.empty()) return false;
+  bool too_often = false;
+  for (const uint64_t index : lost) {
+    const int64_t crashes =
+        db.number(0,
+                  "UPDATE tasks SET crashes=crashes+1 WHERE job_id=?1 AND type=?2 AND "
+                  "chunk_index=?3 RETURNING crashes",
+                  claim.job_id, kChunk, index);
+    too_often |=
+        after_crash(static_cast<int>(crashes), options_.max_attempts) == TaskVerdict::fail_job;
+    add_event(
+        db, claim.job_id, "log",
+        EventJson()
+            .text("message", "The stored chunk " + std::to_string(index) + " was damaged or lost.")
+            .take());
+  }
+  if (too_often) {
+    fail_job(
+        db, claim.job_id,
+        {error_code_name(ErrorCode::internal),
+         "Stored chunks of this job were damaged again and again; check the disk of the store.",
+         ""});
+  } else {
+    bake_again(db, claim.job_id, lost);
+    move_job(db, claim.job_id, JobEvent::chunks_lost, "Baking damaged chunks again.");
+  }
+  writer.commit();
+  return true;
+}
+
 void SqliteStore::commit_result(const Claim& claim, const std::vector<NewArtifact>& artifacts,
                                 const std::string& accuracy_json) {
   if (claim.type != TaskType::assemble) return;
@@ -305,7 +342,7 @@ void SqliteStore::fail_task(const Claim& claim, const JobError& error, bool cras
   writer.commit();
 }
 
-void SqliteStore::release(const Claim& claim) {
+void SqliteStore::release(const Claim& claim, const std::string& reason) {
   Writer writer(*this, Durability::with_the_next);
   Database& db = writer.db();
   if (!holds(db, claim)) return;
@@ -313,8 +350,7 @@ void SqliteStore::release(const Claim& claim) {
       "UPDATE tasks SET state=0, lease=0, worker='', lease_until_ms=0 WHERE job_id=?1 AND type=?2 "
       "AND chunk_index=?3",
       claim.job_id, static_cast<int>(claim.type), claim.chunk_index);
-  db.run("UPDATE jobs SET chunk_fraction=0, reason=?2 WHERE id=?1", claim.job_id,
-         "Waiting for a worker: the last one shut down.");
+  db.run("UPDATE jobs SET chunk_fraction=0, reason=?2 WHERE id=?1", claim.job_id, reason);
   touch(db, claim.job_id);
   writer.commit();
 }

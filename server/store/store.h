@@ -88,7 +88,9 @@ struct Submission {
 };
 struct SubmitResult {
   std::string job_id;
-  bool replayed = false;  // an equal key and body was seen before
+  // An equal key and body was seen before. A job whose artifacts are no longer all there is not
+  // answered with: the order is taken anew under the same key.
+  bool replayed = false;
 };
 
 struct JobFilter {
@@ -183,8 +185,9 @@ class Store {
                                             int64_t wait_ms) = 0;
 
   // --- tasks, for workers ------------------------------------------------------------------------
-  // The next task: by priority, then age, then chunk index. `prefer_job` is taken first when it has
-  // work, so that an oven keeps its scene. A task whose lease expired is claimable again.
+  // The next task: by priority, then age, then chunk index. Among jobs of equal priority
+  // `prefer_job` is taken first when it has work, so that an oven keeps its scene. A task whose
+  // lease expired is claimable again. Error{unavailable} when the store cannot be written.
   virtual std::optional<Claim> claim(const std::string& worker, const std::string& prefer_job) = 0;
   // Extends the lease. Returns false when it is lost or the job is cancelled: stop at once.
   virtual bool heartbeat(const Claim& claim, double fraction) = 0;
@@ -193,15 +196,22 @@ class Store {
   virtual void commit_plan(const Claim& claim, const std::string& plan_json, uint64_t chunks,
                            double predicted_s) = 0;
   virtual void commit_chunk(const Claim& claim, const ChunkCommit& chunk) = 0;
-  virtual std::vector<StoredChunk> load_chunks(const std::string& job_id) = 0;  // all, by index
+  // All, by index. Bytes that no longer match their digest are set aside: Error{internal}; bytes
+  // that are absent: Error{not_found}.
+  virtual std::vector<StoredChunk> load_chunks(const std::string& job_id) = 0;
+  // For the claim of an assembly whose chunks did not load: those without bytes wait to be baked
+  // again, and the job returns to that stage. A chunk lost once too often fails the job. False when
+  // every chunk has its bytes or the lease is lost: nothing was changed.
+  virtual bool rebake_lost_chunks(const Claim& claim) = 0;
   // Artifacts become visible and the job succeeds in one transaction.
   virtual void commit_result(const Claim& claim, const std::vector<NewArtifact>& artifacts,
                              const std::string& accuracy_json) = 0;
   // A task that ended badly. `crashed` (signal, memory, time) is tried again until max_attempts;
   // anything else fails the job at once.
   virtual void fail_task(const Claim& claim, const JobError& error, bool crashed) = 0;
-  // Gives the task back untouched (shutdown).
-  virtual void release(const Claim& claim) = 0;
+  // Gives the task back uncounted. `reason` becomes the job's: one sentence that says why nobody
+  // works on it.
+  virtual void release(const Claim& claim, const std::string& reason) = 0;
   // Blocks until there may be work or `wait_ms` passed. Wakes across processes.
   virtual void wait_for_work(int64_t wait_ms) = 0;
 

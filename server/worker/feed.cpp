@@ -1,6 +1,7 @@
 #include "server/worker/feed.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <set>
 
@@ -57,6 +58,36 @@ bool is_good_name(std::string_view name) {
   throw failure;
 }
 
+// Only the client has the bytes: whatever became of the stored ones, sending them again is the
+// cure.
+Descriptor open_input(Store& store, const std::string& digest) {
+  try {
+    uint64_t size = 0;
+    return Descriptor(store.open_blob(digest, &size));
+  } catch (const Error& error) {
+    const bool damaged = error.code() == ErrorCode::internal;
+    if (!damaged && error.code() != ErrorCode::not_found) throw;
+    throw OvenFailure{{error_code_name(ErrorCode::invalid_input),
+                       "The stored input " + digest + " is " + (damaged ? "damaged" : "gone") +
+                           "; upload it again.",
+                       ""},
+                      false};
+  }
+}
+
+// A number that is stored and added up: an oven's NaN must not get that far.
+double measure(double value, const char* name) {
+  if (!std::isfinite(value) || value < 0)
+    refuse(std::string("The oven reported a ") + name + " that is not a finite number from 0 up.");
+  return value;
+}
+
+double progress_of(PayloadReader& reader) {
+  const double fraction = reader.real();
+  if (!std::isfinite(fraction)) refuse("The oven reported a progress that is not a finite number.");
+  return std::clamp(fraction, 0.0, 1.0);
+}
+
 // Passes progress on until a frame of type `expected` comes.
 Frame await(OvenProcess& oven, FrameType expected, const OnProgress& on_progress) {
   for (;;) {
@@ -64,7 +95,8 @@ Frame await(OvenProcess& oven, FrameType expected, const OnProgress& on_progress
     if (frame.type == expected) return frame;
     if (frame.type == FrameType::error) throw_failure(frame);
     if (frame.type != FrameType::progress) refuse("The oven answered out of turn.");
-    on_progress(std::clamp(PayloadReader(frame.payload).real(), 0.0, 1.0));
+    PayloadReader reader(frame.payload);
+    on_progress(progress_of(reader));
   }
 }
 
@@ -74,8 +106,7 @@ void feed_job(OvenProcess& oven, Store& store, const Claim& claim, const FeedOpt
               const OnProgress& on_progress) {
   const ParsedSpec parsed = parse_spec(claim.spec_json);
   for (const std::string& digest : input_digests(parsed.spec)) {
-    uint64_t size = 0;
-    const Descriptor blob(store.open_blob(digest, &size));
+    const Descriptor blob = open_input(store, digest);
     oven.channel().send(FrameType::input, PayloadWriter().text(digest).take(), blob.get());
   }
   oven.channel().send(FrameType::load, PayloadWriter()
@@ -94,7 +125,7 @@ PlanAnswer feed_plan(OvenProcess& oven, const OnProgress& on_progress) {
   PlanAnswer answer;
   answer.plan_json = reader.text();
   answer.chunks = reader.number();
-  answer.predicted_s = reader.real();
+  answer.predicted_s = measure(reader.real(), "predicted time");
   reader.end();
   if (answer.chunks < 1 || answer.chunks > 1'000'000) refuse("The oven planned no chunks.");
   return answer;
@@ -112,14 +143,14 @@ ChunkCommit feed_chunk(OvenProcess& oven, uint64_t index, const OnProgress& on_p
   commit.bytes = reader.bytes();
   commit.report_json = reader.text();
   commit.elements = reader.number();
-  commit.error_sum_sq = reader.real();
+  commit.error_sum_sq = measure(reader.real(), "sum of squared errors");
   reader.end();
   return commit;
 }
 
-ResultAnswer feed_assembly(OvenProcess& oven, Store& store, const std::string& job_id,
+ResultAnswer feed_assembly(OvenProcess& oven, const std::vector<StoredChunk>& chunks,
                            const OnProgress& on_progress) {
-  for (const StoredChunk& chunk : store.load_chunks(job_id))
+  for (const StoredChunk& chunk : chunks)
     oven.channel().send(FrameType::stored_chunk,
                         PayloadWriter().bytes(chunk.bytes).text(chunk.report_json).take());
   oven.channel().send(FrameType::assemble, {});
@@ -130,7 +161,7 @@ ResultAnswer feed_assembly(OvenProcess& oven, Store& store, const std::string& j
     PayloadReader reader(frame.payload);
     if (frame.type == FrameType::error) throw_failure(frame);
     if (frame.type == FrameType::progress) {
-      on_progress(std::clamp(reader.real(), 0.0, 1.0));
+      on_progress(progress_of(reader));
     } else if (frame.type == FrameType::artifact) {
       NewArtifact artifact;
       artifact.name = reader.text();

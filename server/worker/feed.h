@@ -35,14 +35,15 @@ struct FeedOptions {
 
 using OnProgress = std::function<void(double fraction)>;
 
-// Each call throws OvenFailure when the oven reports an error, PeerGone when it died,
-// and Error{cancelled} when its channel was interrupted.
+// Each call throws OvenFailure when the oven reports an error or a value that cannot be, PeerGone
+// when it died, and Error{cancelled} when its channel was interrupted. feed_job also throws
+// OvenFailure for an input that is damaged or gone.
 void feed_job(OvenProcess& oven, Store& store, const Claim& claim, const FeedOptions& options,
               const OnProgress& on_progress);
 PlanAnswer feed_plan(OvenProcess& oven, const OnProgress& on_progress);
 void feed_known_plan(OvenProcess& oven, const std::string& plan_json);
 ChunkCommit feed_chunk(OvenProcess& oven, uint64_t index, const OnProgress& on_progress);
-ResultAnswer feed_assembly(OvenProcess& oven, Store& store, const std::string& job_id,
+ResultAnswer feed_assembly(OvenProcess& oven, const std::vector<StoredChunk>& chunks,
                            const OnProgress& on_progress);
 
 }  // namespace lightkiln

@@ -27,7 +27,7 @@ struct OvenDeath {
 
 class OvenProcess {
  public:
-  // Starts the program; the kernel kills it when the calling thread ends. `interrupted` is asked
+  // Starts the program with an empty environment; the kernel kills it when the calling thread ends. `interrupted` is asked
   // while waiting for it. Throws Error{unavailable} when it cannot be started.
   OvenProcess(const OvenOptions& options, std::function<bool()> interrupted);
   // Kills and reaps it.

@@ -5,8 +5,11 @@
 #include <limits>
 #include <memory>
 
+#include <unistd.h>
+
 #include "core/base/parallel.h"
 #include "server/store/job_id.h"
+#include "server/worker/back_off.h"
 #include "server/worker/feed.h"
 #include "server/worker/heartbeat.h"
 
@@ -15,6 +18,10 @@ namespace lightkiln {
 namespace {
 
 constexpr int64_t kIdleWaitMs = 500;
+constexpr int kPauseSliceUs = 20'000;
+// Times in a row that a worker gives one task back because the store refused. With the pauses
+// between them that is some three quarters of a minute.
+constexpr int kMaxRefusedTries = 12;
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr int kCancelGraceMs = 1000;  // from a polite request to SIGKILL
 
@@ -54,14 +61,8 @@ class Worker {
     report_missing_layers();
     while (!stopping()) {
       prepare_spare();
-      const std::optional<Claim> claim = next_claim();
-      if (claim) {
-        work(*claim);
-      } else {
-        end_oven();
-        if (options_.exit_when_idle) break;
-        store_->wait_for_work(kIdleWaitMs);
-      }
+      if (!take_turn()) break;
+      pause();
     }
     return 0;
   }
@@ -80,15 +81,41 @@ class Worker {
     return stopping() || timed_out() || (heartbeat_ && heartbeat_->lost());
   }
 
-  // A busy store is waited for: it is no reason to end.
-  std::optional<Claim> next_claim() {
+  // Does a task, or waits for one; false when there is none and the worker is to end then. A busy
+  // or full store says nothing about that: it is left alone for a while and asked again.
+  bool take_turn() {
+    std::optional<Claim> claim;
     try {
-      return store_->claim(name_, oven_job_);
+      claim = store_->claim(name_, oven_job_);
+      if (!claim) {
+        end_oven();
+        if (!options_.exit_when_idle) store_->wait_for_work(kIdleWaitMs);
+      }
     } catch (const Error& error) {
       if (error.code() != ErrorCode::unavailable) throw;
-      std::fprintf(stderr, "worker: %s\n", error.what());
-      return std::nullopt;
+      note_refusal(error);
+      return true;
     }
+    if (!claim) {
+      note_health();
+      return !options_.exit_when_idle;
+    }
+    work(*claim);
+    return true;
+  }
+
+  // Each change of its state is worth one line, and no more.
+  void note_refusal(const Error& error) {
+    if (back_off_.refused(error.what()))
+      std::fprintf(stderr, "worker: backing off: %s\n", error.what());
+  }
+  void note_health() {
+    refused_tries_ = 0;
+    if (back_off_.obliged()) std::fprintf(stderr, "worker: works again\n");
+  }
+  void pause() const {
+    const double until_s = wall_seconds() + back_off_.pause_s();
+    while (!stopping() && wall_seconds() < until_s) usleep(kPauseSliceUs);
   }
 
   std::unique_ptr<OvenProcess> start_oven() {
@@ -149,11 +176,24 @@ class Worker {
         store_->commit_chunk(claim, feed_chunk(oven, claim.chunk_index, on_progress()));
         return;
       case TaskType::assemble: {
-        const ResultAnswer answer = feed_assembly(oven, *store_, claim.job_id, on_progress());
+        const auto chunks = chunks_of(claim);
+        if (!chunks) return;
+        const ResultAnswer answer = feed_assembly(oven, *chunks, on_progress());
         store_->commit_result(claim, answer.artifacts, answer.accuracy_json);
         end_oven();
         return;
       }
+    }
+  }
+
+  // Nothing when some of them were damaged and wait to be baked again.
+  std::optional<std::vector<StoredChunk>> chunks_of(const Claim& claim) {
+    try {
+      return store_->load_chunks(claim.job_id);
+    } catch (const Error& error) {
+      if (error.code() == ErrorCode::unavailable || !store_->rebake_lost_chunks(claim)) throw;
+      std::fprintf(stderr, "worker: %s\n", error.what());
+      return std::nullopt;
     }
   }
 
@@ -162,7 +202,7 @@ class Worker {
       try_to_bake(claim);
     } catch (const Error& error) {
       // The store did not take the outcome; the lease runs out and the task is done again.
-      std::fprintf(stderr, "worker: %s\n", error.what());
+      note_refusal(error);
       end_oven();
     }
     heartbeat_.reset();
@@ -174,6 +214,7 @@ class Worker {
     heartbeat_ = std::make_unique<Heartbeat>(*store_, claim, options_.lease_ms);
     try {
       bake(claim);
+      note_health();
     } catch (const OvenFailure& failure) {
       end_oven();
       store_->fail_task(claim, failure.error, failure.crashed);
@@ -205,15 +246,21 @@ class Worker {
                          ""},
                         true);
     else if (!lost)
-      store_->release(claim);
+      store_->release(claim, "Waiting for a worker: the last one shut down.");
   }
 
-  // The store failed, or this program did.
+  // The store failed, or this program did. A store that is busy or full is not the task's fault,
+  // and yet the same work is not done over and over for it.
   void fail_here(const Claim& claim, const Error& error) {
-    std::fprintf(stderr, "worker: %s\n", error.what());
     end_oven();
-    if (error.code() == ErrorCode::unavailable)
-      return store_->release(claim);  // busy or full: the task is not to blame
+    if (error.code() == ErrorCode::unavailable) {
+      note_refusal(error);
+      if (++refused_tries_ < kMaxRefusedTries)
+        return store_->release(claim, std::string("Waiting to try again: ") + error.what());
+      refused_tries_ = 0;
+      return store_->fail_task(claim, {error_code_name(error.code()), error.what(), ""}, false);
+    }
+    std::fprintf(stderr, "worker: %s\n", error.what());
     store_->fail_task(
         claim,
         {error_code_name(ErrorCode::internal),
@@ -230,6 +277,8 @@ class Worker {
   bool spare_greeted_ = false;          // its hello was read
   std::unique_ptr<Heartbeat> heartbeat_;
   double deadline_s_ = kNever;
+  BackOff back_off_;
+  int refused_tries_ = 0;  // tasks in a row given back because of a refusal
 };
 
 }  // namespace

@@ -74,6 +74,11 @@ class StoreContract : public testing::Test {
     for (const EventRecord& event : store->events(id, 0, 100)) types.push_back(event.type);
     return types;
   }
+  void damage_every_blob() {
+    for (const auto& entry :
+         std::filesystem::recursive_directory_iterator(folder.path() / "store" / "blobs"))
+      if (entry.is_regular_file()) test::write_file(entry.path(), bytes_of("rot!"));
+  }
   size_t blob_files() {
     size_t count = 0;
     for (const auto& entry :
@@ -182,6 +187,20 @@ TEST_F(StoreContract, ClaimsGoByPriorityThenAgeAndPreferTheJobInHand) {
   EXPECT_EQ(store->claim("w", first)->job_id, old) << "a preferred job without work is passed over";
 }
 
+TEST_F(StoreContract, AMoreUrgentOrderComesBeforeTheJobInHand) {
+  const std::string in_hand = submit("in hand");
+  plan(3);
+  EXPECT_EQ(store->claim("w", in_hand)->job_id, in_hand);
+  Submission urgent = order("urgent");
+  urgent.priority = 1;
+  const std::string soon = store->submit(urgent).job_id;
+  Submission idle = order("idle");
+  idle.priority = -1;
+  store->submit(idle);
+  EXPECT_EQ(store->claim("w", in_hand)->job_id, soon);
+  EXPECT_EQ(store->claim("w", in_hand)->job_id, in_hand);
+}
+
 TEST_F(StoreContract, AStaleLeaseChangesNothing) {
   reopen(1);
   const std::string id = submit();
@@ -193,7 +212,7 @@ TEST_F(StoreContract, AStaleLeaseChangesNothing) {
   EXPECT_FALSE(store->heartbeat(stale, 0.5));
   store->commit_plan(stale, "{}", 7, 1);
   store->fail_task(stale, {"internal", "No.", ""}, false);
-  store->release(stale);
+  store->release(stale, "No.");
   EXPECT_EQ(job(id).version, version);
   store->commit_plan(fresh, R"({"plan":2})", 1, 1);
   EXPECT_EQ(job(id).plan_json, R"({"plan":2})");
@@ -286,9 +305,7 @@ TEST_F(StoreContract, RetryBakesAChunkAgainWhoseBytesWereLost) {
   plan(1);
   chunk(take(), "zero");
   const Claim assembling = take();
-  for (const auto& entry :
-       std::filesystem::recursive_directory_iterator(folder.path() / "store" / "blobs"))
-    if (entry.is_regular_file()) test::write_file(entry.path(), bytes_of("rot!"));
+  damage_every_blob();
   EXPECT_EQ(code_of([&] { store->load_chunks(id); }), ErrorCode::internal);
   store->fail_task(assembling, {"internal", "No.", ""}, false);
   store->retry(id);
@@ -297,6 +314,49 @@ TEST_F(StoreContract, RetryBakesAChunkAgainWhoseBytesWereLost) {
   chunk(again, "zero");
   result(take());
   EXPECT_EQ(job(id).state, JobState::succeeded);
+}
+
+TEST_F(StoreContract, AssemblingSendsADamagedChunkBackToBaking) {
+  const std::string id = submit();
+  plan(2);
+  chunk(take(), "zero");
+  chunk(take(), "one");
+  const Claim assembling = take();
+  EXPECT_FALSE(store->rebake_lost_chunks(assembling)) << "nothing is lost yet";
+  damage_every_blob();
+  EXPECT_EQ(code_of([&] { store->load_chunks(id); }), ErrorCode::internal);
+  Claim stale = assembling;
+  ++stale.lease;
+  EXPECT_FALSE(store->rebake_lost_chunks(stale));
+  EXPECT_TRUE(store->rebake_lost_chunks(assembling));
+  EXPECT_EQ(job(id).state, JobState::running);
+  EXPECT_EQ(job(id).stage, JobStage::bake);
+  EXPECT_EQ(job(id).chunks_done, 1u) << "loading stops at the first one that is damaged";
+  const Claim again = take();
+  EXPECT_EQ(again.type, TaskType::chunk);
+  EXPECT_EQ(again.chunk_index, 0u);
+  chunk(again, "zero");
+  EXPECT_EQ(code_of([&] { store->load_chunks(id); }), ErrorCode::internal);
+  EXPECT_TRUE(store->rebake_lost_chunks(take()));
+  chunk(take(), "one");
+  const Claim whole = take();
+  EXPECT_EQ(store->load_chunks(id).size(), 2u);
+  result(whole);
+  EXPECT_EQ(job(id).state, JobState::succeeded);
+}
+
+TEST_F(StoreContract, AChunkDamagedAgainAndAgainFailsTheJob) {
+  const std::string id = submit();
+  plan(1);
+  for (int i = 0; i < 2; ++i) {
+    chunk(take(), "zero");
+    const Claim assembling = take();
+    damage_every_blob();
+    EXPECT_EQ(code_of([&] { store->load_chunks(id); }), ErrorCode::internal);
+    EXPECT_TRUE(store->rebake_lost_chunks(assembling));
+  }
+  EXPECT_EQ(job(id).state, JobState::failed);
+  EXPECT_NE(job(id).error->detail.find("damaged"), std::string::npos);
 }
 
 TEST_F(StoreContract, RemoveTakesTheJobAndWhatNobodyElseNeeds) {
@@ -347,6 +407,28 @@ TEST_F(StoreContract, AnEqualKeyAndBodyReplaysAndAnotherBodyIsRefused) {
   EXPECT_EQ(code_of([&] { store->submit(submission); }), ErrorCode::conflict);
   store->remove(first.job_id);
   EXPECT_FALSE(store->submit(submission).replayed);
+}
+
+TEST_F(StoreContract, AReplayOfAJobWithLostArtifactsIsBakedAnew) {
+  Submission submission = order();
+  submission.idempotency_key = "key";
+  submission.request_digest = "body";
+  const std::string broken = store->submit(submission).job_id;
+  bake_to_the_end();
+  EXPECT_TRUE(store->submit(submission).replayed);
+  reopen(15000);
+  damage_every_blob();
+  const std::string digest = store->artifacts(broken)[0].digest;
+  EXPECT_EQ(code_of([&] { store->open_blob(digest, nullptr); }), ErrorCode::internal);
+  const SubmitResult anew = store->submit(submission);
+  EXPECT_FALSE(anew.replayed);
+  EXPECT_NE(anew.job_id, broken);
+  EXPECT_FALSE(job(anew.job_id).from_cache);
+  bake_to_the_end();
+  EXPECT_EQ(store->submit(submission).job_id, anew.job_id) << "the key names the new job";
+  for (const std::string& id : {broken, anew.job_id})
+    for (const ArtifactRecord& artifact : store->artifacts(id))
+      close(store->open_blob(artifact.digest, nullptr));
 }
 
 TEST_F(StoreContract, MissingInputsAreNamed) {
@@ -448,8 +530,8 @@ TEST_F(StoreContract, VersionsRiseWithEveryVisibleChange) {
 
 TEST_F(StoreContract, ReleaseGivesTheTaskBackUncounted) {
   const std::string id = submit();
-  for (int i = 0; i < 5; ++i) store->release(take());
-  EXPECT_FALSE(job(id).reason.empty());
+  for (int i = 0; i < 5; ++i) store->release(take(), "Waiting for rain.");
+  EXPECT_EQ(job(id).reason, "Waiting for rain.");
   EXPECT_EQ(job(id).attempts, 0);
   EXPECT_TRUE(store->claim("w", ""));
 }

@@ -45,6 +45,10 @@ TEST(JobState, LastChunkLeadsToAssembling) {
   expect_only(last_chunk_committed,
               {{{JobState::running, JobStage::bake}, {JobState::running, JobStage::assemble}}});
 }
+TEST(JobState, LostChunksLeadBackToBaking) {
+  expect_only(chunks_lost,
+              {{{JobState::running, JobStage::assemble}, {JobState::running, JobStage::bake}}});
+}
 TEST(JobState, ResultEndsTheJob) {
   expect_only(result_committed,
               {{{JobState::running, JobStage::assemble}, {JobState::succeeded, JobStage::done}}});

@@ -426,6 +426,51 @@ TEST(Worker, SigtermGivesTheClaimBackUncounted) {
   EXPECT_EQ(house.job(id).attempts, 0);
 }
 
+std::vector<std::byte> rot() {
+  return std::vector<std::byte>(4, std::byte{'x'});
+}
+
+TEST(Worker, ADamagedInputIsTheClientsToSendAgain) {
+  House house;
+  const std::vector<std::byte> glb = one_triangle();
+  const std::string id = house.order(glb, kCoarse);
+  const std::string digest = house.store().put_blob(glb);
+  const std::string hex = digest.substr(7);
+  test::write_file(house.directory() + "/blobs/" + hex.substr(0, 2) + "/" + hex, rot());
+  JobRecord job = house.bake(id, house.worker_options());
+  ASSERT_EQ(job.state, JobState::failed);
+  EXPECT_EQ(job.error->code, "invalid_input");
+  EXPECT_EQ(job.error->detail, "The stored input " + digest + " is damaged; upload it again.");
+  house.store().retry(id);
+  job = house.bake(id, house.worker_options());
+  EXPECT_EQ(job.error->detail, "The stored input " + digest + " is gone; upload it again.");
+  house.store().put_blob(glb);
+  house.store().retry(id);
+  EXPECT_EQ(house.bake(id, house.worker_options()).state, JobState::succeeded);
+}
+
+TEST(Worker, DamagedChunksAreBakedAgainAndTheResultIsTheSame) {
+  House house;
+  const std::vector<std::byte> glb = box_on_a_floor(60);
+  const std::string id = house.order(glb, kCoarse);
+  const std::string input = house.store().put_blob(glb).substr(7);
+  const pid_t worker = house.start_worker(house.worker_options());
+  ASSERT_TRUE(eventually([&] { return house.job(id).chunks_done >= 2; }));
+  EXPECT_EQ(house.end_worker(worker, SIGTERM), 0);
+  ASSERT_EQ(house.job(id).state, JobState::running);
+  int damaged = 0;
+  for (const auto& entry :
+       std::filesystem::recursive_directory_iterator(house.directory() + "/blobs"))
+    if (entry.is_regular_file() && entry.path().filename() != input) {
+      test::write_file(entry.path(), rot());
+      ++damaged;
+    }
+  EXPECT_GE(damaged, 2);
+  const JobRecord job = house.bake(id, house.worker_options());
+  EXPECT_EQ(job.state, JobState::succeeded) << (job.error ? job.error->detail : job.reason);
+  EXPECT_EQ(house.timeless_digests(id), undisturbed());
+}
+
 TEST(Worker, AMissingOvenIsSaid) {
   House house;
   WorkerOptions options = house.worker_options();
