@@ -41,9 +41,10 @@ Vec3 cosine_hemisphere(float u, float v) {
   return {r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u)};
 }
 
-// q / (q + p); p may be infinite.
-float balance_heuristic(float q, float p) {
-  return p > 0 ? q / (q + p) : 1;
+// The power heuristic's weight p^2 / (p^2 + q^2) of light found with density p, times q / p, so
+// that it counts like a ray of density q; p may be infinite.
+float weight_of_found(float q, float p) {
+  return 1 / (q / p + p / q);
 }
 
 struct Vertex {
@@ -172,7 +173,7 @@ struct PathKernel {
         if (!first && scene.environment_sampler_) {
           weight = power_heuristic(scatter_pdf, scene.environment_sampler_->pdf(direction));
         } else if (first && first_density > 0 && scene.glare_) {
-          weight = balance_heuristic(first_density, scene.glare_->pdf(direction));
+          weight = power_heuristic(first_density, scene.glare_->pdf(direction));
         }
       }
       radiance += throughput * environment_radiance(*scene.environment_, direction) * weight;
@@ -187,7 +188,7 @@ struct PathKernel {
       if (!first) {
         weight = power_heuristic(scatter_pdf * cosine, looked_for);
       } else if (first_density > 0) {
-        weight = balance_heuristic(first_density * cosine, looked_for);
+        weight = power_heuristic(first_density * cosine, looked_for);
       }
     }
     radiance += throughput * scene.colors_.emission<kDetail>(hit, counters) * weight;
@@ -306,7 +307,7 @@ DirectLight RadianceScene::glare(const Vec3& origin, const Point2& u, const Firs
   ++counters.environment_reads;
   ++counters.shadow_rays;
   if (tracer_->occluded({origin, light.direction, 0, INFINITY}, counters)) return {};
-  return {light.direction, light.radiance * balance_heuristic(density(light.direction), light.pdf)};
+  return {light.direction, light.radiance * weight_of_found(density(light.direction), light.pdf)};
 }
 
 DirectLight RadianceScene::lamp(const Vec3& origin, const Point4& u, const FirstDensity& density,
@@ -324,8 +325,8 @@ DirectLight RadianceScene::lamp(const Vec3& origin, const Point4& u, const First
   const Vec3 along = offset_origin(there, -direction) - origin;
   if (tracer_->occluded({origin, along, 0, kSegment}, counters)) return {};
   const float cosine = std::abs(facing);
-  const float weight = balance_heuristic(density(direction) * cosine,
-                                         emitters_.area_density(light.mesh) * distance2);
+  const float weight =
+      weight_of_found(density(direction) * cosine, emitters_.area_density(light.mesh) * distance2);
   return {direction, colors_.emission<true>(light, counters) * weight};
 }
 

@@ -72,9 +72,10 @@ class RadianceScene {
   // the randomisation (of seed, element, replicate), `index` the sample in it.
   //
   // `first_density` > 0 is the density per steradian of first rays in this direction for each call
-  // of glare() and of lamp(): light that these find as well counts q / (q + p), q this density and
-  // p theirs (the balance heuristic, Veach, section 9.2). Each light that they return counts as
-  // the radiance of a first ray in that direction does, since L / (q + p) = (L q / (q + p)) / q.
+  // of glare() and of lamp(): light that these find as well counts q^2 / (q^2 + p^2), q this
+  // density and p theirs (the power heuristic, Veach, section 9.2, which leaves lights wider than a
+  // texel to the texel's own even samples). Each light that they return counts as the radiance of a
+  // first ray in that direction does: L / p * p^2 / (q^2 + p^2) = (L q p / (q^2 + p^2)) / q.
   Vec3 sample(const Ray& ray, uint64_t key, uint32_t index, RayCounters& counters,
               float first_density = 0) const {
     return kernel_(*this, ray, key, index, counters, first_density);
