@@ -33,7 +33,7 @@ CubeTexels all_texels(int size);
 // One texel, drawn by `seed`, of each cell of a grid of at most `cells` a side over every face.
 CubeTexels sparse_texels(int size, int cells, uint64_t seed);
 
-inline constexpr uint32_t kDirectPerSample = 4;
+inline constexpr uint32_t kDirectPerSample = 16;
 
 class CubeSampling {
  public:
