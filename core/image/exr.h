@@ -36,10 +36,27 @@ struct ExrWriteOptions {
 // as stored (the conversion of a pixel that holds one spreads it to all three channels).
 DecodedImage read_exr(std::span<const std::byte> bytes);
 
+// Every level of a mip-mapped file that read_exr reads, level 0 first, to 1 x 1; one image of any
+// other file. Throws as read_exr.
+std::vector<Image> read_exr_levels(std::span<const std::byte> bytes);
+
 // Writes a single-part scan-line ZIP file with channels R, G, B (A) or Y, chromaticities of Rec.
 // 709. With `half`, a value that half cannot hold (above 65504) makes the whole file 32-bit float;
 // the result says which was written through `written` when it is not null.
 std::vector<std::byte> write_exr(const Image& image, const ExrWriteOptions& options,
                                  ExrPixelType* written = nullptr);
+
+// Levels of a full mip-map of `width` x `height` pixels: floor(log2(longer side)) + 1.
+int exr_level_count(int width, int height);
+
+// Writes one tiled (64 x 64) mip-mapped ZIP file with levels rounded down, from a strip of cube
+// faces or any other chain: level i is max(1, W >> i) x max(1, H >> i) pixels. The format has all
+// levels down to 1 x 1: those below the last one given are filled with means of the one above, and
+// the attribute "lightkiln.levels" says how many were given. One pixel type holds for all levels:
+// a value in any of them that half cannot hold makes the whole file 32-bit float. Throws Error:
+// invalid_input when a level has another size or number of channels; too_large as write_exr.
+std::vector<std::byte> write_exr_mipmapped(std::span<const Image> levels,
+                                           const ExrWriteOptions& options,
+                                           ExrPixelType* written = nullptr);
 
 }  // namespace lightkiln
