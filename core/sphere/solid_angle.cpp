@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "core/base/math.h"
+#include "core/sphere/direction_map.h"
 
 namespace lightkiln {
 
@@ -29,6 +29,22 @@ double cube_texel_solid_angle(int x, int y, int size) {
 double latlong_texel_solid_angle(int y, int width, int height) {
   const double middle = kPi * (y + 0.5) / height;
   return 4 * kPi / width * std::sin(middle) * std::sin(kPi / (2.0 * height));
+}
+
+// With d = t1 - t0 and t the row's middle, the direction's part along the equator integrates to
+//   int sin^2 = (d - sin d cos 2t) / 2 = (d - sin d) / 2 + sin d sin^2 t
+// times the chord 2 sin(pi / W) of the texel's longitudes, the part along the axis to
+//   int sin cos = sin d sin 2t / 2
+// times their arc 2 pi / W.
+Vec3d latlong_texel_moment(int x, int y, int width, int height) {
+  const double d = kPi / height, middle = kPi * (y + 0.5) / height;
+  const double sine = std::sin(middle), cube = d * d * d;
+  // d - sin d by its series where the difference would cancel.
+  const double excess = d < 0.02 ? cube / 6 * (1 - d * d / 20) : d - std::sin(d);
+  const double across = (excess / 2 + std::sin(d) * sine * sine) * 2 * std::sin(kPi / width);
+  const double along = std::sin(d) * std::sin(2 * middle) / 2 * (2 * kPi / width);
+  const Vec3d outward = latlong_direction((x + 0.5) / width, 0.5);
+  return {outward.x * across, along, outward.z * across};
 }
 
 double cap_solid_angle(double half_angle_rad) {

@@ -2,7 +2,7 @@
 
 // Exact solid angles, in steradians.
 
-#include <vector>
+#include "core/base/math.h"
 
 namespace lightkiln {
 
@@ -12,6 +12,9 @@ double cube_texel_solid_angle(int x, int y, int size);
 
 // Any texel of row y of a lat-long image; all rows times their widths sum to 4 pi within 1e-12.
 double latlong_texel_solid_angle(int y, int width, int height);
+
+// The integral of the unit direction over that texel: its solid angle times its mean direction.
+Vec3d latlong_texel_moment(int x, int y, int width, int height);
 
 // A cone of half-angle a: 4 pi sin^2(a/2), which does not cancel for a small sun.
 double cap_solid_angle(double half_angle_rad);
