@@ -147,6 +147,12 @@ ValidationMessage Client::validate(const std::string& request_json) {
   return read_validation(call(request).body);
 }
 
+std::vector<WorkerMessage> Client::workers() {
+  Call request;
+  request.request.path = "/v1/workers";
+  return read_workers(call(request).body);
+}
+
 std::vector<std::string> Client::missing_blobs(const std::vector<std::string>& digests) {
   std::vector<std::string> missing;
   for (size_t first = 0; first < digests.size(); first += kMaxDigestsPerRequest) {

@@ -63,6 +63,7 @@ class Client {
 
   VersionMessage version();
   ValidationMessage validate(const std::string& request_json);
+  std::vector<WorkerMessage> workers();
   std::vector<std::string> missing_blobs(const std::vector<std::string>& digests);
   // Streams the file, which hashed to `digest` and has `bytes` bytes. False when it was known.
   bool upload(const std::string& digest, const std::filesystem::path& file, uint64_t bytes);

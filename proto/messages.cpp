@@ -294,6 +294,28 @@ std::vector<std::string> read_missing(std::string_view json) {
   return read_texts(answer.view().at("missing"));
 }
 
+std::string write_workers(const std::vector<WorkerMessage>& workers) {
+  JsonWriter writer;
+  writer.begin_object().key("items").begin_array();
+  for (const WorkerMessage& worker : workers)
+    writer.begin_object()
+        .member("name", worker.name)
+        .member("missing_sandbox_layers", worker.missing_sandbox_layers)
+        .end_object();
+  writer.end_array().end_object();
+  return writer.take();
+}
+
+std::vector<WorkerMessage> read_workers(std::string_view json) {
+  const Answer answer(json, "The server's list of workers");
+  std::vector<WorkerMessage> workers;
+  for (const JsonValue& item : answer.view().at("items").items()) {
+    const JsonView view = answer.view().view(item);
+    workers.push_back({view.text("name"), read_texts(view.at("missing_sandbox_layers"))});
+  }
+  return workers;
+}
+
 std::string write_version(const VersionMessage& message) {
   JsonWriter writer;
   writer.begin_object()

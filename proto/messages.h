@@ -151,6 +151,15 @@ std::string write_convergence(const AccuracyRecord& record);
 std::string write_missing(const std::vector<std::string>& digests);
 std::vector<std::string> read_missing(std::string_view json);
 
+// A worker that bakes for this server.
+struct WorkerMessage {
+  std::string name;
+  std::vector<std::string> missing_sandbox_layers;  // what its ovens' sandbox lacks on its machine
+};
+// {"items":[…]}
+std::string write_workers(const std::vector<WorkerMessage>& workers);
+std::vector<WorkerMessage> read_workers(std::string_view json);
+
 struct VersionMessage {
   std::string name = "lightkiln";
   std::string version = LIGHTKILN_VERSION;

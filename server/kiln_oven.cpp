@@ -3,7 +3,6 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 
 #include "server/oven/oven.h"
 #include "server/oven/sandbox.h"
@@ -23,21 +22,12 @@ int usage() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 2) return usage();
+  if (argc != 2) return usage();
   char* end = nullptr;
   lightkiln::SandboxOptions options;
   options.memory_bytes = std::strtoull(argv[1], &end, 10);
   if (end == argv[1] || *end != '\0') return usage();
-  std::vector<std::string> missing = {"all"};
-#ifdef LIGHTKILN_SANITIZED
-  // Sanitizers map terabytes of shadow memory and read /proc: they and a sandbox exclude each
-  // other.
-  const bool sandboxed = argc < 3 || std::strcmp(argv[2], "--unsandboxed") != 0;
-#else
-  if (argc > 2) return usage();
-  const bool sandboxed = true;
-#endif
-  if (sandboxed) missing = lightkiln::enter_sandbox(options);
+  const std::vector<std::string> missing = lightkiln::enter_sandbox(options);
   try {
     lightkiln::Channel channel{lightkiln::Descriptor(kSocket)};
     return lightkiln::serve_oven(channel, missing);

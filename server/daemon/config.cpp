@@ -7,10 +7,18 @@
 
 #include "core/base/error.h"
 #include "server/http/gate.h"
+#include "server/oven/sandbox.h"
+#include "server/worker/sandbox_policy.h"
 
 namespace lightkiln {
 
 namespace {
+
+std::vector<std::string> layer_names() {
+  std::vector<std::string> names = {kAllLayers};
+  for (const SandboxLayer& layer : sandbox_layers()) names.emplace_back(layer.name);
+  return names;
+}
 
 // What an operator grants to every job; the same for both commands.
 template <typename Config>
@@ -30,6 +38,10 @@ void add_grants(CLI::App& app, Config& config) {
   app.add_option("--task-seconds", config.task_seconds, "Wall time that one task may take")
       ->check(CLI::Range(1.0, 1e6))
       ->capture_default_str();
+  app.add_option("--allow-missing-sandbox", config.allow_missing_sandbox,
+                 "Bake although this machine lacks these layers of an oven's sandbox, or 'all'")
+      ->delimiter(',')
+      ->check(CLI::IsMember(layer_names()));
   app.add_option("--lease-ms", config.lease_ms, "Time after which a silent worker loses its task")
       ->check(CLI::Range(500, 3600000))
       ->capture_default_str();

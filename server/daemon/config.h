@@ -27,6 +27,7 @@ struct ServeConfig {
   uint64_t oven_memory_bytes = WorkerOptions().oven_memory_bytes;
   double chunk_seconds = WorkerOptions().chunk_seconds;
   double task_seconds = WorkerOptions().task_seconds;
+  std::vector<std::string> allow_missing_sandbox;  // as WorkerOptions
   int max_connections = 256;
   int max_connections_per_address = 32;
   // The program started as `worker`, and the one that workers start as oven.

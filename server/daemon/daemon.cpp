@@ -13,6 +13,7 @@
 #include "server/http/api.h"
 #include "server/http/fence.h"
 #include "server/store/store.h"
+#include "server/worker/sandbox_policy.h"
 
 namespace lightkiln {
 
@@ -56,13 +57,16 @@ FenceLimits fence_limits(const ServeConfig& config) {
 
 std::vector<std::vector<std::string>> worker_commands(const ServeConfig& config) {
   std::vector<std::vector<std::string>> commands;
-  for (int i = 0; i < config.workers; ++i)
+  for (int i = 0; i < config.workers; ++i) {
     commands.push_back({config.worker_program, "worker", "--store", config.store_directory,
                         "--oven", config.oven_path, "--threads", std::to_string(config.threads),
                         "--oven-memory-mib", std::to_string(config.oven_memory_bytes >> 20),
                         "--chunk-seconds", std::to_string(config.chunk_seconds), "--task-seconds",
                         std::to_string(config.task_seconds), "--lease-ms",
                         std::to_string(config.lease_ms), "--name", "local-" + std::to_string(i)});
+    for (const std::string& layer : config.allow_missing_sandbox)
+      commands.back().insert(commands.back().end(), {"--allow-missing-sandbox", layer});
+  }
   return commands;
 }
 
@@ -136,6 +140,8 @@ int serve(const ServeConfig& config) {
   sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   const pid_t parent = ::getppid();
+  // Said here and at once: workers would say it again and again, and jobs would only wait.
+  if (config.workers > 0) try_sandbox(config.oven_path, config.allow_missing_sandbox);
   Daemon daemon(config);
 
   const timespec turn{0, 200'000'000};

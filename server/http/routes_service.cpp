@@ -35,6 +35,12 @@ HttpReply page_headers(HttpReply reply) {
       .set("Cross-Origin-Resource-Policy", "same-origin");
 }
 
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
 HttpReply live(RouteContext&, RouteCall&) {
   return text_reply("ok\n");
 }
@@ -54,11 +60,23 @@ HttpReply ready(RouteContext& context, RouteCall& call) {
   if (!call.request.head.parameter("verbose")) return text_reply("ok\n");
   lines += "free_bytes " + std::to_string(health.free_bytes) + "\nqueued " +
            std::to_string(health.queued) + "\nrunning " + std::to_string(health.running) + '\n';
+  const std::vector<WorkerRecord> workers = context.store.workers();
+  lines += "workers " + std::to_string(workers.size()) + '\n';
+  for (const WorkerRecord& worker : workers)
+    if (!worker.missing_layers.empty())
+      lines += "[!] sandbox: the ovens of worker " + worker.name + " lack " +
+               joined(worker.missing_layers) + ", as its operator allows\n";
   return text_reply(lines);
 }
 
 HttpReply version(RouteContext&, RouteCall&) {
   return json_reply(write_version({}));
+}
+HttpReply workers(RouteContext& context, RouteCall&) {
+  std::vector<WorkerMessage> messages;
+  for (const WorkerRecord& worker : context.store.workers())
+    messages.push_back({worker.name, worker.missing_layers});
+  return json_reply(write_workers(messages));
 }
 HttpReply kinds(RouteContext&, RouteCall&) {
   return json_reply(write_kinds());
@@ -88,6 +106,14 @@ HttpReply metrics(RouteContext& context, RouteCall&) {
     else
       totals += "# TYPE lightkiln_" + name + " gauge\nlightkiln_" + name + value;
   }
+  std::map<std::string, int> missing_layers;
+  const std::vector<WorkerRecord> workers = context.store.workers();
+  for (const WorkerRecord& worker : workers)
+    for (const std::string& layer : worker.missing_layers) ++missing_layers[layer];
+  totals += "# TYPE lightkiln_workers_without_sandbox_layer gauge\n";
+  for (const auto& [layer, count] : missing_layers)
+    totals += "lightkiln_workers_without_sandbox_layer{layer=\"" + layer + "\"} " +
+              std::to_string(count) + '\n';
   const StoreHealth health = context.store.health();
   const auto gauge = [&](const char* name, uint64_t value) {
     totals += std::string("# TYPE lightkiln_") + name + " gauge\nlightkiln_" + name + ' ' +
@@ -98,6 +124,7 @@ HttpReply metrics(RouteContext& context, RouteCall&) {
   gauge("jobs_queued", health.queued);
   gauge("jobs_running", health.running);
   gauge("leases_overdue", health.overdue);
+  gauge("workers", workers.size());
   gauge("resident_memory_bytes", resident_bytes());
   const auto up = std::chrono::steady_clock::now() - context.started;
   gauge("uptime_seconds",
@@ -199,6 +226,7 @@ std::vector<Route> service_routes() {
   const BodyRule none = BodyRule::none;
   return {
       {"GET", "/v1/kinds", Scope::read, none, {}, kinds},
+      {"GET", "/v1/workers", Scope::read, none, {}, workers},
       {"GET", "/livez", Scope::open, none, {}, live},
       {"GET", "/readyz", Scope::open, none, {"verbose"}, ready},
       {"GET", "/version", Scope::open, none, {}, version},

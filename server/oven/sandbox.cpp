@@ -18,7 +18,7 @@ namespace lightkiln {
 
 namespace {
 
-bool prefer_for_oom_kill() {
+bool prefer_for_oom_kill(const SandboxOptions&) {
   const int fd = open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
   if (fd < 0) return false;
   const bool written = write(fd, "1000", 4) == 4;
@@ -34,16 +34,19 @@ bool limit(__rlimit_resource_t resource, rlim_t value) {
   return setrlimit(resource, &limits) == 0;
 }
 
-bool limit_resources(uint64_t memory_bytes) {
+bool limit_resources(const SandboxOptions&) {
   bool all = limit(RLIMIT_CORE, 0);
   all &= limit(RLIMIT_FSIZE, 0);
   all &= limit(RLIMIT_NOFILE, 64);
-  if (memory_bytes > 0) all &= limit(RLIMIT_AS, memory_bytes);
   return all;
 }
 
+bool limit_address_space(const SandboxOptions& options) {
+  return options.memory_bytes == 0 || limit(RLIMIT_AS, options.memory_bytes);
+}
+
 // One call for all three is refused as a whole where one is: user first, which grants the others.
-bool leave_namespaces() {
+bool leave_namespaces(const SandboxOptions&) {
   const bool user = unshare(CLONE_NEWUSER) == 0;
   const bool net = unshare(CLONE_NEWNET) == 0;
   const bool ipc = unshare(CLONE_NEWIPC) == 0;
@@ -52,8 +55,12 @@ bool leave_namespaces() {
 
 // A change of credentials clears this setting, so it comes after the namespaces. A parent that died
 // before is noticed because its end of the pipe is closed.
-bool die_with_parent() {
+bool die_with_parent(const SandboxOptions&) {
   return prctl(PR_SET_PDEATHSIG, SIGKILL) == 0;
+}
+
+bool renounce_privileges(const SandboxOptions&) {
+  return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0;
 }
 
 // The attribute as newer kernels know it; older ones accept it when the unknown tail is zero.
@@ -66,7 +73,7 @@ struct LandlockAttributes {
 // Rights grow with the ABI (Linux, Documentation/userspace-api/landlock.rst): 13 at first, REFER at
 // 2, TRUNCATE at 3, TCP bind and connect at 4, IOCTL_DEV at 5, scopes for abstract sockets and
 // signals at 6.
-bool leave_file_system() {
+bool leave_file_system(const SandboxOptions&) {
   const long abi =
       syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
   if (abi < 1) return false;
@@ -157,7 +164,7 @@ bool add_rules(scmp_filter_ctx filter) {
   return all;
 }
 
-bool limit_system_calls() {
+bool limit_system_calls(const SandboxOptions&) {
   const scmp_filter_ctx filter = seccomp_init(SCMP_ACT_ERRNO(EPERM));
   if (!filter) return false;
   const bool loaded = add_rules(filter) && seccomp_load(filter) == 0;
@@ -165,20 +172,41 @@ bool limit_system_calls() {
   return loaded;
 }
 
+constexpr SandboxLayer kLayers[] = {
+    {"oom_score", "is the first to end when the machine runs out of memory", prefer_for_oom_kill,
+     true},
+    {"limits", "makes no file or core dump, and holds few descriptors", limit_resources, true},
+    {"address_space", "takes no more memory than it is granted", limit_address_space, false},
+    {"namespaces", "has no network and shares no memory", leave_namespaces, true},
+    {"parent_death", "ends with its worker", die_with_parent, true},
+    {"no_new_privileges", "gains no rights by executing a program", renounce_privileges, true},
+    {"landlock", "opens no file", leave_file_system, false},
+    {"seccomp", "asks the kernel for memory, threads and clocks, and for nothing else",
+     limit_system_calls, false},
+};
+
 }  // namespace
 
+std::span<const SandboxLayer> sandbox_layers() {
+  return kLayers;
+}
+
+const SandboxLayer* find_sandbox_layer(std::string_view name) {
+  for (const SandboxLayer& layer : kLayers)
+    if (name == layer.name) return &layer;
+  return nullptr;
+}
+
 std::vector<std::string> enter_sandbox(const SandboxOptions& options) {
+#ifdef LIGHTKILN_SANITIZED
+  constexpr bool kSanitized = true;
+#else
+  constexpr bool kSanitized = false;
+#endif
   std::vector<std::string> missing;
-  const auto layer = [&](bool entered, const char* name) {
-    if (!entered) missing.emplace_back(name);
-  };
-  layer(prefer_for_oom_kill(), "oom_score");
-  layer(limit_resources(options.memory_bytes), "limits");
-  layer(leave_namespaces(), "namespaces");
-  layer(die_with_parent(), "parent_death");
-  layer(prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0, "no_new_privileges");
-  layer(leave_file_system(), "landlock");
-  layer(limit_system_calls(), "seccomp");
+  for (const SandboxLayer& layer : kLayers)
+    if ((kSanitized && !layer.with_sanitizers) || !layer.enter(options))
+      missing.emplace_back(layer.name);
   return missing;
 }
 

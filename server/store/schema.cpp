@@ -83,6 +83,9 @@ CREATE INDEX idempotency_by_age ON idempotency(created_ms);
 CREATE TABLE workers(
   name TEXT PRIMARY KEY, process TEXT NOT NULL) WITHOUT ROWID;
 )sql",
+    R"sql(
+ALTER TABLE workers ADD COLUMN missing_layers TEXT NOT NULL DEFAULT '';
+)sql",
 };
 constexpr int kSchemaVersion = sizeof(kMigrations) / sizeof(kMigrations[0]);
 

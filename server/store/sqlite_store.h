@@ -50,6 +50,7 @@ class SqliteStore final : public Store {
   std::optional<JobRecord> wait_job(const std::string& id, uint64_t version,
                                     int64_t wait_ms) override;
 
+  void enlist(const std::string& worker, const std::vector<std::string>& missing_layers) override;
   std::optional<Claim> claim(const std::string& worker, const std::string& prefer_job) override;
   bool heartbeat(const Claim& claim, double fraction) override;
   bool holds_lease(const Claim& claim) override;
@@ -65,6 +66,7 @@ class SqliteStore final : public Store {
   void wait_for_work(int64_t wait_ms) override;
 
   StoreHealth health() override;
+  std::vector<WorkerRecord> workers() override;
   std::map<std::string, uint64_t> counts() override;
 
   // Remembers that a client sent these bytes, so that removing a job never takes them away.
@@ -96,7 +98,7 @@ class SqliteStore final : public Store {
   bool answer_from_cache(Database& db, const std::string& id, const Submission& submission);
   void drop_chunk_bytes(Database& db, const std::string& id, std::vector<std::string>* orphans);
   void remove_orphans(Database& db, const std::vector<std::string>& digests);
-  void register_worker(Database& db, const std::string& worker);
+  void register_worker(Database& db, const std::string& worker, const std::string& missing);
   bool lose_lease(Database& db, const Claim& claim, int losses);
 
   JobRecord read_job(Database& db, const Statement& row, bool documents);

@@ -1,6 +1,8 @@
 // The store as workers see it: claim under a lease, beat, commit, fail, release. A commit whose
 // lease token is not the task's present one changes nothing.
 
+#include <sstream>
+
 #include "core/base/parallel.h"
 #include "server/store/event_json.h"
 #include "server/store/process_identity.h"
@@ -31,10 +33,38 @@ std::string task_name(const Claim& claim) {
 
 // --- claim ---------------------------------------------------------------------------------------
 
-void SqliteStore::register_worker(Database& db, const std::string& worker) {
+void SqliteStore::register_worker(Database& db, const std::string& worker,
+                                  const std::string& missing) {
   if (!own_workers_.insert(worker).second) return;
-  db.run("INSERT INTO workers VALUES(?1,?2) ON CONFLICT(name) DO UPDATE SET process=?2", worker,
-         own_identity_);
+  db.run(
+      "INSERT INTO workers(name,process,missing_layers) VALUES(?1,?2,?3) ON CONFLICT(name) DO "
+      "UPDATE SET process=?2, missing_layers=?3",
+      worker, own_identity_, missing);
+}
+
+void SqliteStore::enlist(const std::string& worker,
+                         const std::vector<std::string>& missing_layers) {
+  std::string names;
+  for (const std::string& layer : missing_layers) names += (names.empty() ? "" : " ") + layer;
+  Writer writer(*this, Durability::with_the_next);
+  expire_dead_workers(writer.db());
+  register_worker(writer.db(), worker, names);
+  writer.commit();
+}
+
+std::vector<WorkerRecord> SqliteStore::workers() {
+  ReadAccess read(*this);
+  Statement rows =
+      read.db().query("SELECT name, process, missing_layers FROM workers ORDER BY name");
+  std::vector<WorkerRecord> workers;
+  while (rows.step()) {
+    if (is_provably_dead(rows.text(1))) continue;
+    std::istringstream words(rows.text(2));
+    WorkerRecord& worker = workers.emplace_back();
+    worker.name = rows.text(0);
+    for (std::string layer; words >> layer;) worker.missing_layers.push_back(layer);
+  }
+  return workers;
 }
 
 // Whether a claim could find something; reads only, so that idle workers write nothing.
@@ -126,7 +156,7 @@ std::optional<Claim> SqliteStore::claim(const std::string& worker, const std::st
     if (was_leased && lose_lease(db, *claim, losses + 1)) claim.reset();
   }
   if (claim) {
-    register_worker(db, worker);
+    register_worker(db, worker, "");
     claim->lease = static_cast<uint64_t>(
         db.number(0, "UPDATE counters SET value=value+1 WHERE name='lease' RETURNING value"));
     db.run(

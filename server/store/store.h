@@ -129,6 +129,12 @@ struct NewArtifact {
   std::vector<std::byte> bytes;
 };
 
+// A worker that is not known to have ended.
+struct WorkerRecord {
+  std::string name;
+  std::vector<std::string> missing_layers;  // of its ovens' sandbox
+};
+
 struct StoreHealth {
   bool writable = false;
   std::string detail;  // what is wrong, "" when nothing
@@ -185,6 +191,9 @@ class Store {
                                             int64_t wait_ms) = 0;
 
   // --- tasks, for workers ------------------------------------------------------------------------
+  // Makes a worker known to workers(); claim() enlists those that did not.
+  virtual void enlist(const std::string& worker,
+                      const std::vector<std::string>& missing_layers) = 0;
   // The next task: by priority, then age, then chunk index. Among jobs of equal priority
   // `prefer_job` is taken first when it has work, so that an oven keeps its scene. A task whose
   // lease expired is claimable again. Error{unavailable} when the store cannot be written.
@@ -216,6 +225,7 @@ class Store {
   virtual void wait_for_work(int64_t wait_ms) = 0;
 
   virtual StoreHealth health() = 0;
+  virtual std::vector<WorkerRecord> workers() = 0;  // by name
   // Counters for /metrics: jobs by (kind, state) and totals.
   virtual std::map<std::string, uint64_t> counts() = 0;
 };

@@ -90,18 +90,15 @@ OvenProcess::OvenProcess(const OvenOptions& options, std::function<bool()> inter
   std::string memory =
       std::to_string(options.memory_bytes > 0 ? options.memory_bytes + kAddressSpaceBesides : 0);
   std::string program = options.path;
-  std::vector<char*> arguments = {program.data(), memory.data()};
+  char* arguments[] = {program.data(), memory.data(), nullptr};
   // What the worker's environment holds is no business of a program that opens clients' files.
   char* nothing[] = {nullptr};
   char** environment = nothing;
 #ifdef LIGHTKILN_SANITIZED
   environment = environ;  // where sanitizers look for their options
-  std::string unsandboxed = "--unsandboxed";
-  arguments.push_back(unsandboxed.data());
 #endif
-  arguments.push_back(nullptr);
-  const int failure = posix_spawn(&pid_, program.c_str(), actions.get(), attributes.get(),
-                                  arguments.data(), environment);
+  const int failure =
+      posix_spawn(&pid_, program.c_str(), actions.get(), attributes.get(), arguments, environment);
   if (failure != 0) {
     pid_ = -1;
     throw Error(ErrorCode::unavailable, "The oven '" + options.path +

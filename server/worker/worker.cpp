@@ -12,12 +12,14 @@
 #include "server/worker/back_off.h"
 #include "server/worker/feed.h"
 #include "server/worker/heartbeat.h"
+#include "server/worker/sandbox_policy.h"
 
 namespace lightkiln {
 
 namespace {
 
 constexpr int64_t kIdleWaitMs = 500;
+constexpr int kFirstGreetingMs = 10'000;
 constexpr int kPauseSliceUs = 20'000;
 // Times in a row that a worker gives one task back because the store refused. With the pauses
 // between them that is some three quarters of a minute.
@@ -58,7 +60,8 @@ class Worker {
 
   int run() {
     prepare_spare();
-    report_missing_layers();
+    greet(*spare_, kFirstGreetingMs);
+    spare_greeted_ = true;
     while (!stopping()) {
       prepare_spare();
       if (!take_turn()) break;
@@ -133,15 +136,15 @@ class Worker {
     oven_job_.clear();
   }
 
-  void report_missing_layers() {
-    const std::optional<Frame> hello = spare_->channel().receive(10'000);
-    if (!hello || hello->type != FrameType::hello)
-      throw Error(ErrorCode::unavailable, "The oven '" + options_.oven_path + "' does not answer.");
-    PayloadReader reader(hello->payload);
-    for (uint64_t left = reader.number(); left > 0; --left)
-      std::fprintf(stderr, "worker: the oven's sandbox lacks a layer: %s\n",
-                   std::string(reader.text()).c_str());
-    spare_greeted_ = true;
+  // What the first oven lacks is told to the store and the log; no oven is used that lacks more
+  // than is allowed.
+  void greet(OvenProcess& oven, int wait_ms) {
+    const std::vector<std::string> missing = read_greeting(oven, wait_ms);
+    require_sandbox(missing, options_.allow_missing_sandbox);
+    if (std::exchange(enlisted_, true)) return;
+    store_->enlist(name_, missing);
+    for (const std::string& layer : missing)
+      std::fprintf(stderr, "worker: the oven's sandbox lacks a layer: %s\n", layer.c_str());
   }
 
   // The oven that holds the claim's job, loading it into the spare one when there is none.
@@ -151,9 +154,7 @@ class Worker {
     prepare_spare();
     oven_ = std::move(spare_);
     oven_job_ = claim.job_id;
-    const bool greeted = std::exchange(spare_greeted_, false);
-    if (!greeted && oven_->channel().receive(-1)->type != FrameType::hello)
-      throw OvenFailure{{"oven_crashed", "The oven did not greet its worker.", ""}, true};
+    if (!std::exchange(spare_greeted_, false)) greet(*oven_, -1);
     const FeedOptions feed{options_.threads, options_.oven_memory_bytes, options_.chunk_seconds};
     feed_job(*oven_, *store_, claim, feed, on_progress());
     if (claim.type != TaskType::plan) feed_known_plan(*oven_, claim.plan_json);
@@ -275,6 +276,7 @@ class Worker {
   std::string oven_job_;
   std::unique_ptr<OvenProcess> spare_;  // started, sandboxed, waiting
   bool spare_greeted_ = false;          // its hello was read
+  bool enlisted_ = false;
   std::unique_ptr<Heartbeat> heartbeat_;
   double deadline_s_ = kNever;
   BackOff back_off_;

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace lightkiln {
 
@@ -19,6 +20,9 @@ struct WorkerOptions {
   int64_t lease_ms = 15000;                 // > 0
   double chunk_seconds = 4.0;               // work aimed at per chunk
   double task_seconds = 3600.0;             // wall time that one task may take
+  // Layers of the oven's sandbox that this machine need not have: names of sandbox_layers(), or
+  // "all".
+  std::vector<std::string> allow_missing_sandbox;
   const std::atomic<bool>* stop = nullptr;  // besides SIGTERM and SIGINT; null = those only
 };
 
@@ -26,7 +30,8 @@ struct WorkerOptions {
 // Returns the exit code for the process: 0.
 // A task that its oven could not finish fails with one of the codes of error_code_name, or
 // "oven_crashed"; oven_crashed, out_of_memory and timed_out are tried again as the store allows.
-// Throws Error when the store cannot be opened or no oven can be started.
+// Throws Error when the store cannot be opened, no oven can be started, or its sandbox lacks a
+// layer that is not allowed to be missing.
 int run_worker(const WorkerOptions& options);
 
 }  // namespace lightkiln

@@ -16,6 +16,7 @@
 #include "core/base/error.h"
 #include "proto/json.h"
 #include "server/daemon/supervisor.h"
+#include "server/oven/frames.h"
 #include "server/store/store.h"
 #include "tests/http/raw_client.h"
 #include "tests/support/data.h"
@@ -212,12 +213,14 @@ std::string kilnd() {
 // A `kilnd serve` as a child process.
 class Process {
  public:
-  Process(const TemporaryFolder& folder, std::vector<std::string> more)
+  Process(const TemporaryFolder& folder, std::vector<std::string> more,
+          std::vector<std::string> sandbox = {"--allow-missing-sandbox", "all"})
       : port_file_(folder.path() / "port") {
     std::vector<std::string> words = {
         kilnd(),       "serve",       "--store",  folder.path() / "store", "--listen",
         "127.0.0.1:0", "--port-file", port_file_, "--log-level",           "error"};
     words.insert(words.end(), more.begin(), more.end());
+    words.insert(words.end(), sandbox.begin(), sandbox.end());
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
@@ -292,6 +295,19 @@ TEST_F(ProcessTest, ItsWorkersEndWithItHoweverItEnds) {
     for (const pid_t worker : workers)
       EXPECT_TRUE(soon([&] { return !alive(worker); })) << "after signal " << signal;
   }
+}
+
+TEST_F(ProcessTest, DoesNotStartWhereTheSandboxOfItsOvensIsIncomplete) {
+  const std::string frames = folder.path() / "frames", oven = folder.path() / "oven";
+  const std::string hello = PayloadWriter().number(1).text("landlock").take();
+  std::ofstream(frames) << frame_header(FrameType::hello, hello.size()) << hello;
+  std::ofstream(oven) << "#!/bin/sh\n/bin/cat " << frames << " >&3\nexec /bin/cat <&3 >/dev/null\n";
+  fs::permissions(oven, fs::perms::owner_all);
+  const std::vector<std::string> words = {"--workers", "1", "--oven", oven};
+  EXPECT_EQ(Process(folder, words, {}).end(), 1);
+  EXPECT_FALSE(fs::exists(folder.path() / "port"));
+  Process allowed(folder, words, {"--allow-missing-sandbox", "landlock"});
+  EXPECT_GT(allowed.port(), 0);
 }
 
 TEST_F(ProcessTest, ASecondSignalEndsItAtOnce) {

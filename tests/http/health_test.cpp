@@ -38,5 +38,27 @@ TEST(Health, AServiceWhoseDiskIsFullIsNotReadyAndSaysSo) {
             std::string::npos);
 }
 
+TEST(Health, WorkersAndWhatTheirSandboxesLackCanBeSeen) {
+  Service service;
+  service.store->enlist("whole-1", {});
+  service.store->enlist("torn-2", {"landlock", "namespaces"});
+  const std::string verbose = get(service.port, "/readyz?verbose").body;
+  EXPECT_NE(verbose.find("workers 2\n"), std::string::npos) << verbose;
+  EXPECT_NE(verbose.find("[!] sandbox: the ovens of worker torn-2 lack landlock, namespaces"),
+            std::string::npos)
+      << verbose;
+  EXPECT_EQ(verbose.find("whole-1"), std::string::npos);
+  const std::string metrics = get(service.port, "/metrics").body;
+  EXPECT_NE(metrics.find("lightkiln_workers 2\n"), std::string::npos);
+  EXPECT_NE(metrics.find("lightkiln_workers_without_sandbox_layer{layer=\"landlock\"} 1\n"),
+            std::string::npos);
+  const std::vector<WorkerMessage> workers = read_workers(get(service.port, "/v1/workers").body);
+  ASSERT_EQ(workers.size(), 2u);
+  EXPECT_EQ(workers[0].name, "torn-2");
+  EXPECT_EQ(workers[0].missing_sandbox_layers,
+            (std::vector<std::string>{"landlock", "namespaces"}));
+  EXPECT_EQ(workers[1].missing_sandbox_layers.size(), 0u);
+}
+
 }  // namespace
 }  // namespace lightkiln::test

@@ -286,6 +286,7 @@ TEST(OpenApi, DescribesWhatIsWritten) {
   expect_fits(write_event_page({{1, "j", "log", 1, "{}"}}, 0), "EventPage");
   expect_fits(write_artifact_list("j", job.artifacts), "ArtifactList");
   expect_fits(write_missing({"x"}), "MissingBlobs");
+  expect_fits(write_workers({{"w", {"landlock"}}}), "WorkerList");
   expect_fits(write_version({}), "Version");
   expect_fits(write_validation({job.spec_json, "d", {}}), "Validation");
   expect_fits(write_kinds(), "KindList");

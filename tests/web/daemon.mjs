@@ -17,7 +17,8 @@ export async function startDaemon() {
   const portFile = join(folder, "port");
   const child = spawn(
     join(binaries, "kilnd"),
-    ["serve", "--store", join(folder, "store"), "--listen", "127.0.0.1:0", "--port-file", portFile, "--parent-watch"],
+    ["serve", "--store", join(folder, "store"), "--listen", "127.0.0.1:0", "--port-file", portFile, "--parent-watch",
+      "--allow-missing-sandbox", "all"],
     { stdio: ["ignore", "ignore", "pipe"] },
   );
   let log = "";

@@ -102,6 +102,54 @@ TEST_F(FakeOven, InheritsNothingOfTheEnvironment) {
   EXPECT_TRUE(test::read_file(seen).empty());
 }
 
+std::string greeting(const std::vector<std::string>& missing) {
+  PayloadWriter hello;
+  hello.number(missing.size());
+  for (const std::string& layer : missing) hello.text(layer);
+  return frame(FrameType::hello, hello.take());
+}
+
+TEST_F(FakeOven, IsNotUsedWhereItsSandboxLacksWhatIsNotAllowedToBeMissing) {
+  const auto refusal = [&](const std::vector<std::string>& missing,
+                           const std::vector<std::string>& allowed) -> std::string {
+    WorkerOptions options;
+    options.store_directory = folder.path() / "store";
+    options.oven_path = program(greeting(missing));
+    options.exit_when_idle = true;
+    options.allow_missing_sandbox = allowed;
+    try {
+      EXPECT_EQ(run_worker(options), 0);
+      return "";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::unavailable);
+      return error.what();
+    }
+  };
+  EXPECT_EQ(refusal({}, {}), "");
+  EXPECT_EQ(refusal({"landlock"}, {"landlock"}), "");
+  EXPECT_EQ(refusal({"landlock", "seccomp"}, {"all"}), "");
+  const std::string why = refusal({"namespaces", "landlock", "seccomp"}, {"landlock"});
+  EXPECT_NE(why.find("has no network"), std::string::npos) << why;
+  EXPECT_NE(why.find("--allow-missing-sandbox namespaces,seccomp."), std::string::npos) << why;
+}
+
+TEST_F(FakeOven, TellsTheStoreWhatItsSandboxLacks) {
+  StoreOptions kept;
+  kept.directory = folder.path() / "store";
+  const std::unique_ptr<Store> store = open_sqlite_store(kept);
+  WorkerOptions options;
+  options.store_directory = kept.directory;
+  options.oven_path = program(greeting({"landlock", "seccomp"}));
+  options.name = "w";
+  options.exit_when_idle = true;
+  options.allow_missing_sandbox = {"landlock", "seccomp"};
+  EXPECT_EQ(run_worker(options), 0);
+  const std::vector<WorkerRecord> workers = store->workers();
+  ASSERT_EQ(workers.size(), 1u);
+  EXPECT_EQ(workers[0].name.substr(0, 2), "w-");
+  EXPECT_EQ(workers[0].missing_layers, (std::vector<std::string>{"landlock", "seccomp"}));
+}
+
 TEST(BackOff, DoublesFromATenthToFiveSecondsAndSpeaksOncePerChange) {
   BackOff back_off;
   EXPECT_EQ(back_off.pause_s(), 0);

@@ -33,6 +33,21 @@ void upload_missing(Session& session, const Order& order, const std::vector<std:
   }
 }
 
+// A private daemon bakes its user's own files, so it does so on machines that cannot shut its ovens
+// in (most containers, old kernels); that is no secret.
+void warn_of_missing_sandbox(Session& session) {
+  if (!session.is_private() || session.arguments().quiet) return;
+  for (const WorkerMessage& worker : session.client().workers()) {
+    if (worker.missing_sandbox_layers.empty()) continue;
+    std::string layers;
+    for (const std::string& layer : worker.missing_sandbox_layers)
+      layers += (layers.empty() ? "" : ", ") + layer;
+    std::cerr << "Warning: on this machine the sandbox around the baking process lacks "
+              << printable(layers) << "; bake only files that you trust.\n";
+    return;
+  }
+}
+
 bool hopeless(const JobMessage& job) {
   if (!job.error) return false;
   for (const ErrorCode code : {ErrorCode::invalid_spec, ErrorCode::invalid_input,
@@ -72,6 +87,7 @@ ExitCode bake(const Arguments& arguments) {
   JobMessage job =
       revive(session, session.client().submit(request, submission_key(session, request), 1));
   job = watch(session, job);
+  warn_of_missing_sandbox(session);
   std::vector<ArtifactMessage> artifacts;
   if (job.state == "succeeded") artifacts = fetch_artifacts(session, job, {});
   if (arguments.json)

@@ -131,6 +131,8 @@ void PrivateDaemon::start(int threads) {
                                           "1",
                                           "--threads",
                                           std::to_string(threads),
+                                          "--allow-missing-sandbox",
+                                          "all",  // kiln bake warns of it
                                           "--parent-watch"};
   child_ = fork();
   if (child_ < 0)
