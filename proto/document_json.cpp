@@ -40,10 +40,23 @@ void write_radiance_convention(JsonWriter& writer) {
   writer.end_object();
 }
 
-void write_sh(JsonWriter& writer, const ShDocument& document) {
+void write_measured(JsonWriter& writer, const MeasuredError& measured) {
+  writer.key("measured_error")
+      .begin_object()
+      .member("count", measured.count)
+      .member("rms", measured.rms)
+      .member("max", measured.max)
+      .end_object();
+}
+
+// `measured` null: the coefficients have an error bar instead.
+void write_sh(JsonWriter& writer, const ShDocument& document,
+              const MeasuredError* measured = nullptr) {
   writer.begin_object().member("bands", document.sh.bands).key("coefficients").begin_array();
   for (const Vec3d& coefficient : document.sh.coefficients) writer.value(coefficient);
-  writer.end_array().member("error", document.error).key("selftest").begin_array();
+  writer.end_array().member("error", document.error);
+  if (measured) write_measured(writer, *measured);
+  writer.key("selftest").begin_array();
   for (const ShSelftest& test : document.selftest)
     writer.begin_object()
         .member("direction", test.direction)
@@ -96,6 +109,15 @@ void write_ao(JsonWriter& writer, const AoDocument& document) {
   writer.end_array();
 }
 
+// `own` writes what only this product says.
+void write_map(JsonWriter& writer, const MapDocument& map, const auto& own) {
+  writer.begin_object().member("artifact", map.artifact).member("size", map.size);
+  own();
+  writer.member("error_bound", map.error_bound);
+  write_measured(writer, map.measured);
+  writer.end_object();
+}
+
 void write_environment(JsonWriter& writer, const EnvironmentDocument& document) {
   write_radiance_convention(writer);
   writer.key("source")
@@ -113,38 +135,26 @@ void write_environment(JsonWriter& writer, const EnvironmentDocument& document) 
       .end_object()
       .end_object();
   writer.key("sh");
-  if (document.sh.empty())
-    writer.null();
+  if (document.sh)
+    write_sh(writer, *document.sh, &document.sh_measured);
   else
-    write_sh(writer, document.sh.front());
+    writer.null();
   writer.key("irradiance");
-  if (document.irradiance_artifact.empty())
-    writer.null();
+  if (document.irradiance)
+    write_map(writer, *document.irradiance, [&] { writer.member("quantity", "irradiance"); });
   else
-    writer.begin_object()
-        .member("artifact", document.irradiance_artifact)
-        .member("quantity", "irradiance")
-        .member("size", document.irradiance_size)
-        .member("error_bound", document.irradiance_error_bound)
-        .end_object();
+    writer.null();
   writer.key("prefilter").begin_array();
-  for (const PrefilterLevel& level : document.prefilter)
-    writer.begin_object()
-        .member("artifact", level.artifact)
-        .member("size", level.size)
-        .member("roughness", level.roughness)
-        .member("alpha", level.roughness * level.roughness)
-        .member("error_bound", level.error_bound)
-        .end_object();
+  for (const MapDocument& level : document.prefilter)
+    write_map(writer, level, [&] {
+      writer.member("roughness", level.roughness)
+          .member("alpha", level.roughness * level.roughness);
+    });
   writer.end_array().key("dfg");
-  if (document.dfg_artifact.empty())
-    writer.null();
+  if (document.dfg)
+    write_map(writer, *document.dfg, [] {});
   else
-    writer.begin_object()
-        .member("artifact", document.dfg_artifact)
-        .member("size", document.dfg_size)
-        .member("error_bound", document.dfg_error_bound)
-        .end_object();
+    writer.null();
 }
 
 void write_probes(JsonWriter& writer, const ProbesDocument& document) {

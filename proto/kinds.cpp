@@ -12,6 +12,9 @@ struct TypeOf {
   const char* operator()(std::optional<double>& (*)(Spec&)) const { return "number"; }
   const char* operator()(std::vector<Vec3d>& (*)(Spec&)) const { return "positions"; }
   const char* operator()(const NameMember&) const { return "string"; }
+  const char* operator()(const NameSetMember&) const { return "names"; }
+  const char* operator()(const NumbersMember&) const { return "numbers"; }
+  const char* operator()(bool& (*)(Spec&)) const { return "boolean"; }
   template <typename Whole>
   const char* operator()(Whole& (*)(Spec&)) const {
     return "integer";
@@ -35,6 +38,17 @@ struct WriteDefault {
 
   void operator()(std::vector<Vec3d>& (*)(Spec&)) const { writer.null(); }
   void operator()(const NameMember& member) const { writer.value(member.names[member.get(spec)]); }
+  void operator()(const NameSetMember& member) const {
+    writer.begin_array();
+    for (size_t i = 0; i < member.names.size(); ++i)
+      if (member.bits(spec) >> i & 1) writer.value(member.names[i]);
+    writer.end_array();
+  }
+  void operator()(const NumbersMember& member) const {
+    writer.begin_array();
+    for (const double number : member.list(spec)) writer.value(number);
+    writer.end_array();
+  }
   template <typename T>
   void operator()(std::optional<T>& (*member)(Spec&)) const {
     if (member(spec))
@@ -48,13 +62,19 @@ struct WriteDefault {
   }
 };
 
+void write_names(JsonWriter& writer, const std::vector<std::string_view>& names) {
+  writer.key("values").begin_array();
+  for (const std::string_view name : names) writer.value(name);
+  writer.end_array();
+}
+
 void write_range(JsonWriter& writer, const ParameterRow& row) {
-  if (const auto* names = std::get_if<NameMember>(&row.member)) {
-    writer.key("values").begin_array();
-    for (const std::string_view name : names->names) writer.value(name);
-    writer.end_array();
-    return;
-  }
+  if (const auto* one = std::get_if<NameMember>(&row.member))
+    return write_names(writer, one->names);
+  if (const auto* some = std::get_if<NameSetMember>(&row.member))
+    return write_names(writer, some->names);
+  if (const auto* numbers = std::get_if<NumbersMember>(&row.member))
+    writer.member("min_items", numbers->least).member("max_items", numbers->most);
   if (row.range.minimum > -1e300)
     writer.member(row.range.exclusive_minimum ? "exclusive_minimum" : "minimum", row.range.minimum);
   if (row.range.maximum < 1e300) writer.member("maximum", row.range.maximum);

@@ -33,6 +33,18 @@ struct RowWriter {
           JsonValue(JsonValue::Array{JsonValue(p.x), JsonValue(p.y), JsonValue(p.z)}));
     return JsonValue(std::move(positions));
   }
+  JsonValue operator()(bool& (*member)(Spec&)) const { return JsonValue(member(spec)); }
+  JsonValue operator()(const NumbersMember& member) const {
+    JsonValue::Array numbers;
+    for (const double number : member.list(spec)) numbers.push_back(JsonValue(number));
+    return JsonValue(std::move(numbers));
+  }
+  JsonValue operator()(const NameSetMember& member) const {
+    JsonValue::Array names;
+    for (size_t i = 0; i < member.names.size(); ++i)
+      if (member.bits(spec) >> i & 1) names.push_back(JsonValue(std::string(member.names[i])));
+    return JsonValue(std::move(names));
+  }
   JsonValue operator()(const NameMember& member) const {
     return JsonValue(std::string(member.names[member.get(spec)]));
   }

@@ -85,6 +85,33 @@ bool read_value(const JsonPlace& place, const Range& range, Whole* out) {
   return true;
 }
 
+bool read_value(const JsonPlace& place, const Range&, bool* out) {
+  const bool* value = place.value->boolean();
+  if (!value) {
+    place.refuse_type("true or false");
+    return false;
+  }
+  *out = *value;
+  return true;
+}
+
+// The index of a name; none after a fault.
+std::optional<size_t> read_name(const JsonPlace& place, std::span<const std::string_view> names,
+                                const std::string& allowed) {
+  const std::string* name = place.value->string();
+  if (!name) {
+    place.refuse_type("one of " + allowed);
+    return std::nullopt;
+  }
+  const auto found = std::find(names.begin(), names.end(), *name);
+  if (found != names.end()) return static_cast<size_t>(found - names.begin());
+  place.faults->add(
+      {place.pointer, "range",
+       place.pointer + " must be " + allowed + ", not \"" + name->substr(0, 80) + "\".", allowed,
+       nearest_name(*name, names)});
+  return std::nullopt;
+}
+
 void read_position(const JsonPlace& place, std::vector<Vec3d>* out) {
   const JsonValue::Array* numbers = place.value->array();
   if (!numbers || numbers->size() != 3) {
@@ -128,17 +155,39 @@ struct RowReader {
     for (size_t i = 0; i < items->size(); ++i)
       read_position(place.child(std::to_string(i), (*items)[i]), &member(spec));
   }
-  void operator()(const NameMember& member) const {
+  void operator()(const NumbersMember& member) const {
     const std::string allowed = allowed_values(row);
-    const std::string* name = place.value->string();
-    if (!name) return place.refuse_type("one of " + allowed);
-    const auto found = std::find(member.names.begin(), member.names.end(), *name);
-    if (found != member.names.end())
-      return member.set(spec, static_cast<size_t>(found - member.names.begin()));
-    place.faults->add(
-        {place.pointer, "range",
-         place.pointer + " must be " + allowed + ", not \"" + name->substr(0, 80) + "\".", allowed,
-         nearest_name(*name, member.names)});
+    const JsonValue::Array* items = place.value->array();
+    if (!items) return place.refuse_type(allowed);
+    if (items->size() < member.least || items->size() > member.most)
+      return place.refuse(
+          "range",
+          place.pointer + " must be " + allowed + "; it has " + std::to_string(items->size()) + ".",
+          allowed);
+    std::vector<double> numbers(items->size());
+    bool good = true;
+    for (size_t i = 0; i < items->size(); ++i)
+      good &= read_value(place.child(std::to_string(i), (*items)[i]), row.range, &numbers[i]);
+    if (good) member.list(spec) = std::move(numbers);
+  }
+  void operator()(const NameMember& member) const {
+    const std::optional<size_t> index = read_name(place, member.names, allowed_values(row));
+    if (index) member.set(spec, *index);
+  }
+  void operator()(const NameSetMember& member) const {
+    const std::string allowed = join_names(member.names);
+    const JsonValue::Array* items = place.value->array();
+    if (!items) return place.refuse_type(allowed_values(row));
+    uint32_t bits = 0;
+    for (size_t i = 0; i < items->size(); ++i) {
+      const JsonPlace item = place.child(std::to_string(i), (*items)[i]);
+      const std::optional<size_t> index = read_name(item, member.names, allowed);
+      if (!index) continue;
+      const uint32_t bit = 1u << *index;
+      if (bits & bit) item.refuse("duplicate", item.pointer + " stands in the list already.", "");
+      bits |= bit;
+    }
+    member.bits(spec) = bits;
   }
 };
 
@@ -320,7 +369,15 @@ std::string allowed_values(const ParameterRow& row) {
       return "a list of " + json_number(row.range.minimum) + " to " +
              json_number(row.range.maximum) + " positions [x, y, z], each from -1e18 to 1e18";
     }
+    std::string operator()(bool& (*)(Spec&)) const { return "true or false"; }
+    std::string operator()(const NumbersMember& member) const {
+      return "a list of " + std::to_string(member.least) + " to " + std::to_string(member.most) +
+             ", each " + value_text(row.range, static_cast<double*>(nullptr));
+    }
     std::string operator()(const NameMember& member) const { return join_names(member.names); }
+    std::string operator()(const NameSetMember& member) const {
+      return "a list of " + join_names(member.names) + ", each at most once";
+    }
   };
   return std::visit(Text{row}, row.member);
 }

@@ -40,10 +40,16 @@ ParameterGroup accuracy_group() {
        {"max_seconds", +[](Spec& s) -> std::optional<double>& { return s.accuracy.max_seconds; },
         kPositive, false,
         "Seconds that baking may be predicted to take; it pins a sample count before baking "
-        "starts. null = no limit."}}};
+        "starts. null = no limit."},
+       {"check_texels",
+        +[](Spec& s) -> int& { return s.accuracy.check_texels; },
+        {0, 4096},
+        false,
+        "Texels, coefficients or entries of each output that are held against a slow "
+        "double-precision twin; 0 = none. One costs a pass over the map."}}};
 }
 
-// The group with the rows refused that a kind which takes no samples has no use for.
+// The group with the rows refused that a kind has no use for.
 ParameterGroup without(ParameterGroup group, std::initializer_list<std::string_view> names) {
   for (ParameterRow& row : group.rows)
     row.refused = std::find(names.begin(), names.end(), row.name) != names.end();
@@ -100,7 +106,7 @@ KindTable ambient_occlusion_table() {
   return {Kind::ambient_occlusion,
           "Openness at every vertex of a scene: 1 = open sky.",
           {{"scene", &Spec::scene, true}},
-          {root_group(), accuracy_group(), own}};
+          {root_group(), without(accuracy_group(), {"check_texels"}), own}};
 }
 
 KindTable environment_maps_table() {
@@ -151,7 +157,7 @@ KindTable environment_maps_table() {
 }
 
 KindTable probes_table() {
-  std::vector<ParameterGroup> groups = {root_group(), accuracy_group()};
+  std::vector<ParameterGroup> groups = {root_group(), without(accuracy_group(), {"check_texels"})};
   groups.push_back(
       {"/parameters",
        {{"positions",

@@ -19,12 +19,24 @@ struct NameMember {
   size_t (*get)(const Spec& spec);
   void (*set)(Spec& spec, size_t index);
 };
+// A set of members of an enumeration, each at most once; bit i stands for names[i]. Its spelling is
+// a list, written in the order of `names`.
+struct NameSetMember {
+  std::vector<std::string_view> names;
+  uint32_t& (*bits)(Spec& spec);
+};
+// A list of numbers: the row's range bounds each of them, these how many there are.
+struct NumbersMember {
+  std::vector<double>& (*list)(Spec& spec);
+  size_t least, most;
+};
 // How a row reaches its member. The spec is of the row's kind and has the row's group. An optional
 // member takes null.
 using Member =
     std::variant<double& (*)(Spec&), std::optional<double>& (*)(Spec&), int& (*)(Spec&),
                  std::optional<int>& (*)(Spec&), uint64_t& (*)(Spec&),
-                 std::optional<uint64_t>& (*)(Spec&), std::vector<Vec3d>& (*)(Spec&), NameMember>;
+                 std::optional<uint64_t>& (*)(Spec&), bool& (*)(Spec&),
+                 std::vector<Vec3d>& (*)(Spec&), NumbersMember, NameMember, NameSetMember>;
 
 struct Range {
   double minimum = -1e300;

@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
@@ -78,11 +79,19 @@ struct ShDocument {
 };
 std::vector<ShSelftest> make_selftest(const ShRgb& sh);
 
-struct PrefilterLevel {
+// What an output differs by from a slow double-precision twin, on a sample of its texels,
+// coefficients or entries; in the unit of its bound.
+struct MeasuredError {
+  uint64_t count = 0;  // how many were compared; 0 = none
+  double rms = 0, max = 0;
+};
+// An image that a map was turned into.
+struct MapDocument {
   std::string artifact;
   int size = 0;
-  double roughness = 0;
-  double error_bound = 0;  // relative to the level's mean
+  double roughness = 0;    // of a prefiltered level
+  double error_bound = 0;  // rms over the sphere, relative to the output's mean; DFG: absolute
+  MeasuredError measured;
 };
 struct EnvironmentDocument {
   int source_width = 0, source_height = 0;
@@ -90,14 +99,11 @@ struct EnvironmentDocument {
   PixelRepairs repairs;
   Vec3d mean;
   double max_luminance = 0;
-  std::vector<ShDocument> sh;  // none or one
-  std::vector<PrefilterLevel> prefilter;
-  std::string irradiance_artifact;
-  int irradiance_size = 0;
-  double irradiance_error_bound = 0;  // relative to the mean irradiance
-  std::string dfg_artifact;
-  int dfg_size = 0;
-  double dfg_error_bound = 0;
+  std::optional<ShDocument> sh;
+  MeasuredError sh_measured;
+  std::optional<MapDocument> irradiance;
+  std::vector<MapDocument> prefilter;  // levels from the sharpest
+  std::optional<MapDocument> dfg;
 };
 
 enum class ProbeStatus { valid, inside_geometry, on_surface };

@@ -178,6 +178,15 @@ void check_accuracy(const Accuracy& accuracy, Checker& checker) {
     checker.between<uint64_t>(*accuracy.max_samples, 64, 1048576, "/accuracy/max_samples",
                               "max_samples");
   checker.positive(accuracy.max_seconds, "/accuracy/max_seconds", "max_seconds");
+  checker.between(accuracy.check_texels, 0, 4096, "/accuracy/check_texels", "check_texels");
+}
+
+// What is sampled is measured by its own samples.
+void refuse_checks(const Spec& spec, Checker& checker) {
+  if (spec.accuracy.check_texels != Accuracy::kDefaultCheckTexels)
+    checker.fault("/accuracy/check_texels", "conflict",
+                  std::string("check_texels belongs to environment_maps; ") +
+                      kind_name(spec.kind()) + " states an error bar with every element.");
 }
 
 // Environment maps are sums and transforms: nothing is drawn at random, so there are no samples to
@@ -204,6 +213,7 @@ std::vector<SpecFault> validate(const Spec& spec) {
       require_input(spec.scene, "scene", kind, checker);
       refuse_input(spec.environment, "environment", kind, checker);
       check_ambient_occlusion(std::get<AmbientOcclusionParameters>(spec.parameters), checker);
+      refuse_checks(spec, checker);
       break;
     case Kind::environment_maps:
       refuse_input(spec.scene, "scene", kind, checker);
@@ -214,6 +224,7 @@ std::vector<SpecFault> validate(const Spec& spec) {
     case Kind::probes:
       require_input(spec.scene, "scene", kind, checker);
       check_probes(std::get<ProbesParameters>(spec.parameters), checker);
+      refuse_checks(spec, checker);
       break;
   }
   if (spec.scene) check_input(*spec.scene, "/inputs/scene", checker);

@@ -92,6 +92,11 @@ struct Accuracy {
   // CPU-independent promise: wall seconds that the plan may predict for baking, > 0. It pins a
   // sample count before baking starts. None = no limit. Refused for environment maps.
   std::optional<double> max_seconds;
+  // Texels, coefficients or entries of each output that are held against a slow double-precision
+  // twin, 0..4096; 0 = none. One costs a pass over the map. Environment maps only: sampled results
+  // carry an error bar of their own.
+  int check_texels = kDefaultCheckTexels;
+  static constexpr int kDefaultCheckTexels = 4;
 };
 
 struct Spec {

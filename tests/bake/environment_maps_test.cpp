@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/bake/bake.h"
+#include "core/bake/maps_output.h"
 #include "core/image/exr.h"
 #include "core/image/radiance_hdr.h"
 #include "core/sphere/direction_map.h"
@@ -87,8 +88,8 @@ TEST(EnvironmentMaps, BakesAWhiteFurnaceToExactlyOne) {
     ASSERT_EQ(v, static_cast<float>(kPi));
   }
   const EnvironmentDocument& document = document_of(result);
-  EXPECT_NEAR(document.sh[0].sh.coefficients[0].x, 2 * std::sqrt(kPi), 1e-14);
-  for (size_t i = 1; i < 25; ++i) EXPECT_EQ(document.sh[0].sh.coefficients[i], Vec3d{});
+  EXPECT_NEAR(document.sh->sh.coefficients[0].x, 2 * std::sqrt(kPi), 1e-14);
+  for (size_t i = 1; i < 25; ++i) EXPECT_EQ(document.sh->sh.coefficients[i], Vec3d{});
   EXPECT_EQ(result.accuracy.status, AccuracyStatus::exact);
 }
 
@@ -118,7 +119,7 @@ TEST(EnvironmentMaps, MakesOnlyWhatIsOrdered) {
   EXPECT_EQ(plan.max_samples, 3u);  // bands of the map that were transformed
   EXPECT_TRUE(result.artifacts.empty());
   EXPECT_TRUE(document_of(result).prefilter.empty());
-  EXPECT_EQ(document_of(result).irradiance_artifact, "");
+  EXPECT_FALSE(document_of(result).irradiance.has_value());
   EXPECT_TRUE(effect_of(plan, "sh").active);
   for (const char* name : {"irradiance", "prefilter", "dfg", "bright_texels"}) {
     EXPECT_FALSE(effect_of(plan, name).active) << name;
@@ -130,8 +131,8 @@ TEST(EnvironmentMaps, OrdersTheSameCoefficientsAloneOrWithTheRest) {
   EnvironmentMapsParameters alone;
   alone.sh = ShOutput{5};
   const auto file = exr_of(reference::test_sky(32, 100));
-  const ShRgb a = document_of(bake(order(alone), file)).sh[0].sh;
-  const ShRgb b = document_of(bake(order(everything()), file)).sh[0].sh;
+  const ShRgb a = document_of(bake(order(alone), file)).sh->sh;
+  const ShRgb b = document_of(bake(order(everything()), file)).sh->sh;
   for (size_t i = 0; i < 25; ++i) {
     EXPECT_NEAR(length(a.coefficients[i] - b.coefficients[i]), 0, 1e-7 * length(a.coefficients[0]));
   }
@@ -167,9 +168,9 @@ TEST(EnvironmentMaps, WritesChainIrradianceAndTableThatReadBack) {
   EXPECT_NEAR(dfg.rgb(12, 9).x, value.scale, 1e-4);
   EXPECT_NEAR(dfg.rgb(12, 9).y, value.bias, 1e-4);
   EXPECT_EQ(dfg.rgb(12, 9).z, 0.0f);
-  ASSERT_EQ(document.sh[0].selftest.size(), 6u);
-  for (const ShSelftest& test : document.sh[0].selftest) {
-    EXPECT_EQ(test.radiance, sh_evaluate(document.sh[0].sh, test.direction));
+  ASSERT_EQ(document.sh->selftest.size(), 6u);
+  for (const ShSelftest& test : document.sh->selftest) {
+    EXPECT_EQ(test.radiance, sh_evaluate(document.sh->sh, test.direction));
   }
 }
 
@@ -186,6 +187,42 @@ TEST(EnvironmentMaps, StatesBoundsAndPrices) {
     EXPECT_GT(accuracy.time_to_error[i].seconds, 0);
   }
   EXPECT_GT(accuracy.time_to_error[4].samples, accuracy.time_to_error[0].samples);
+}
+
+// Every output of the general path is held against its twin, and none errs by more than was
+// ordered; a closed form has nothing to measure.
+TEST(EnvironmentMaps, MeasuresItsErrorAgainstTheTwin) {
+  Spec spec = order(everything());
+  spec.accuracy.check_texels = 6;
+  const Assembly result = bake(spec, exr_of(reference::test_sky(64, 1e5)), 2);
+  const EnvironmentDocument& document = document_of(result);
+  EXPECT_EQ(document.sh_measured.count, 6u);
+  EXPECT_LE(document.sh_measured.max, document.sh->error);
+  std::vector<MapDocument> maps = document.prefilter;
+  maps.push_back(*document.irradiance);
+  maps.push_back(*document.dfg);
+  for (const MapDocument& map : maps) {
+    EXPECT_EQ(map.measured.count, 6u) << map.artifact;
+    EXPECT_LE(map.measured.rms, 1e-3) << map.artifact;
+    EXPECT_GE(map.measured.max, map.measured.rms) << map.artifact;
+    EXPECT_GT(map.measured.max, 0) << map.artifact;
+  }
+  spec.accuracy.check_texels = 0;
+  EXPECT_EQ(document_of(bake(spec, exr_of(constant_map(2)))).prefilter[1].measured.count, 0u);
+}
+
+TEST(MapsOutput, IsSuspiciousWhenWhatIsSeenBreaksWhatWasPromised) {
+  ChunkReport report;
+  Round round;
+  judge_output(1e-4, {4, 2e-5, 3e-5}, 1e-3, &report, &round);
+  EXPECT_EQ(round.converged, 1u);
+  judge_output(1e-4, {4, 6e-4, 2e-3}, 1e-3, &report, &round);
+  EXPECT_EQ(report.suspicious, 1u);
+  judge_output(1e-2, {4, 2e-5, 3e-5}, 1e-3, &report, &round);
+  EXPECT_EQ(report.budget_limited, 1u);
+  EXPECT_EQ(round.converged, 1u);
+  EXPECT_DOUBLE_EQ(round.error_max, 1e-2);
+  EXPECT_DOUBLE_EQ(round.error_sum_sq, 1e-8 + 36e-8 + 1e-4);
 }
 
 TEST(EnvironmentMaps, SaysWhenAnOrderCannotBeReached) {
@@ -225,7 +262,7 @@ TEST(EnvironmentMaps, GivesTheSameBytesForAnyThreadsAndChunks) {
   }
   const Assembly split = Bake(spec, inputs, grants).assemble(plan, results, progress);
   EXPECT_EQ(bytes_of(one), bytes_of(split));
-  EXPECT_EQ(document_of(one).sh[0].sh.coefficients, document_of(split).sh[0].sh.coefficients);
+  EXPECT_EQ(document_of(one).sh->sh.coefficients, document_of(split).sh->sh.coefficients);
 }
 
 TEST(EnvironmentMaps, CountsRepairsAndBakesTheCleanedMap) {

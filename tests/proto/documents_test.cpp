@@ -122,7 +122,7 @@ TEST(DocumentJson, CarriesConventionAndSelftest) {
   sh.sh = ShRgb(1);
   sh.sh.coefficients[0] = {1, 2, 3};
   sh.selftest.push_back({{0, 0, 1}, {0.5, 1, 1.5}, {2, 4, 6}});
-  document.sh.push_back(sh);
+  document.sh = sh;
   Assembly assembly;
   assembly.document = document;
   assembly.artifacts.push_back({"dfg.exr", "image", "image/x-exr", {std::byte{7}}});

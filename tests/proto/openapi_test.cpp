@@ -85,6 +85,18 @@ void expect_same(const JsonValue& row, const JsonValue* property) {
     return;
   }
   EXPECT_EQ(text(property->find("default")), text(row.find("default")));
+  if (type == "names" || type == "numbers") {
+    EXPECT_EQ(text(property->find("type")), "\"array\"");
+    EXPECT_EQ(text(property->find("minItems")), text(row.find("min_items")));
+    EXPECT_EQ(text(property->find("maxItems")), text(row.find("max_items")));
+    const JsonValue* items = property->find("items");
+    ASSERT_NE(items, nullptr);
+    EXPECT_EQ(text(items->find("enum")), text(row.find("values")));
+    EXPECT_EQ(text(items->find("minimum")), text(row.find("minimum")));
+    EXPECT_EQ(text(items->find("exclusiveMinimum")), text(row.find("exclusive_minimum")));
+    EXPECT_EQ(text(items->find("maximum")), text(row.find("maximum")));
+    return;
+  }
   const bool nullable = *row.find("nullable")->boolean();
   EXPECT_EQ(text(property->find("type")),
             nullable ? "[\"" + type + "\",\"null\"]" : "\"" + type + "\"");
@@ -110,7 +122,7 @@ TEST(OpenApi, HasEveryRowWithItsDefaultAndRange) {
     const std::string stated = text(entry.find("default_target_error")) + " for " + kind_name(kind);
     EXPECT_NE(text(error->find("description")).find(stated), std::string::npos) << stated;
   }
-  EXPECT_EQ(rows, 23);
+  EXPECT_GE(rows, 24);
 }
 
 TEST(OpenApi, HasNoParameterWithoutARow) {

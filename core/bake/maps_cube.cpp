@@ -1,0 +1,158 @@
+#include "core/bake/maps_cube.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/bake/maps_cost.h"
+#include "core/base/text.h"
+#include "core/environment/brute_force.h"
+#include "core/environment/resample.h"
+#include "core/sphere/direction_map.h"
+
+namespace lightkiln {
+
+ConvolvedCube::ConvolvedCube(MapsLight& light, int size, std::optional<double> alpha, double scale,
+                             double target)
+    : size_(size), alpha_(alpha), scale_(scale), constant_(light.constant()) {
+  if (alpha_ && !constant_) lobe_ = plan_lobe(light.statistics(), *alpha_, target);
+}
+
+double ConvolvedCube::error_bound() const {
+  if (constant_) return 0;
+  return alpha_ ? lobe_.error_bound : kResampleError;
+}
+
+SpectrumNeed ConvolvedCube::spectrum_need() const {
+  return {0, lobe_.bands > 0 ? &lobe_ : nullptr};
+}
+
+double ConvolvedCube::model_seconds(MapsLight& light) const {
+  if (constant_) return 0;
+  const Image& map = light.environment().radiance;
+  const double texels = 6.0 * size_ * size_;
+  if (!alpha_) return kResamplePerCell * (map.width + 4.0 * size_) * (map.height + 2.0 * size_);
+  const double cut = lobe_.bands;
+  double seconds = kRingPerTerm * cut * cut * cut + kPerTexel * texels;
+  if (lobe_.corrected) {
+    seconds += kPerBrightTexel * texels * static_cast<double>(light.statistics().bright.size());
+  }
+  return seconds;
+}
+
+Image ConvolvedCube::make_cube(MapsLight& light, Progress& progress) const {
+  if (!constant_ && !alpha_) {
+    return resample_to_cube(light.environment().radiance, size_, light.threads(), progress);
+  }
+  Image cube(size_, 6 * size_, 3);
+  if (constant_) {
+    const Vec3 radiance = to_float(light.environment().mean);
+    for (size_t i = 0; i < cube.pixels.size(); i += 3) std::copy_n(&radiance.x, 3, &cube.pixels[i]);
+  } else {
+    cube = convolve_lobe(light.statistics(), light.spectrum(progress), lobe_, size_,
+                         light.threads(), progress);
+  }
+  if (scale_ != 1) {
+    for (float& value : cube.pixels) value = static_cast<float>(scale_ * double(value));
+  }
+  return cube;
+}
+
+// Relative to the output's mean.
+MeasuredError ConvolvedCube::check(MapsLight& light, const Image& cube, int count,
+                                   Progress& progress) const {
+  ErrorMeter meter(scale_ * luminance(light.environment().mean));
+  const std::optional<GgxLobe> lobe = alpha_ ? std::optional<GgxLobe>(*alpha_) : std::nullopt;
+  const size_t side = static_cast<size_t>(size_);
+  for (int i = 0; i < count; ++i) {
+    progress.check();
+    const size_t index = check_index(i, 6 * side * side);
+    const int x = static_cast<int>(index % side), y = static_cast<int>(index / side);
+    const Vec3d truth = lobe ? lobe_average(light.environment(), *lobe, *alpha_,
+                                            cube_texel_direction(y / size_, x, y % size_, size_)) *
+                                   scale_
+                             : texel_average(light.environment(), y / size_, x, y % size_, size_);
+    meter.add(to_double(cube.rgb(x, y)), truth);
+  }
+  return meter.result();
+}
+
+MeasuredError ConvolvedCube::make(MapsLight& light, int check_texels, ByteWriter& writer,
+                                  Progress& progress) const {
+  const Image cube = make_cube(light, progress);
+  writer.floats(cube.pixels);
+  return constant_ ? MeasuredError{} : check(light, cube, check_texels, progress);
+}
+
+Image ConvolvedCube::read(ByteReader& reader) const {
+  Image cube(size_, 6 * size_, 3);
+  reader.floats(cube.pixels);
+  return cube;
+}
+
+namespace {
+
+class IrradianceCube : public ConvolvedCube {
+ public:
+  IrradianceCube(MapsLight& light, int size, double target)
+      : ConvolvedCube(light, size, 1.0, kPi, target) {}
+
+  void file(ByteReader& reader, const MeasuredError& measured, Assembly* assembly,
+            EnvironmentDocument* document) const override {
+    assembly->artifacts.push_back(cube_artifact(
+        "irradiance.exr", read(reader),
+        {{"lightkiln.quantity", "irradiance at a surface whose normal is the direction"}}));
+    document->irradiance = MapDocument{"irradiance.exr", size(), 0, error_bound(), measured};
+  }
+};
+
+class PrefilteredLevel : public ConvolvedCube {
+ public:
+  PrefilteredLevel(MapsLight& light, int size, int index, double roughness, double target)
+      : ConvolvedCube(light, size,
+                      roughness > 0 ? std::optional(roughness * roughness) : std::nullopt, 1,
+                      target),
+        index_(index),
+        roughness_(roughness) {}
+
+  void file(ByteReader& reader, const MeasuredError& measured, Assembly* assembly,
+            EnvironmentDocument* document) const override {
+    const std::string name = "prefilter_" + std::to_string(index_) + ".exr";
+    assembly->artifacts.push_back(
+        cube_artifact(name, read(reader),
+                      {{"lightkiln.quantity", "radiance prefiltered with GGX, n = v = r"},
+                       {"lightkiln.roughness", short_number(roughness_)}}));
+    document->prefilter.push_back({name, size(), roughness_, error_bound(), measured});
+  }
+
+ private:
+  int index_;
+  double roughness_;
+};
+
+void order_irradiance(const EnvironmentMapsParameters& parameters, MapsLight& light, double target,
+                      MapsOutputs* outputs) {
+  outputs->push_back(std::make_unique<IrradianceCube>(light, parameters.irradiance->size, target));
+}
+
+void order_prefilter(const EnvironmentMapsParameters& parameters, MapsLight& light, double target,
+                     MapsOutputs* outputs) {
+  const auto [size, levels] = *parameters.prefilter;
+  for (int level = 0; level < levels; ++level) {
+    outputs->push_back(std::make_unique<PrefilteredLevel>(light, size >> level, level,
+                                                          double(level) / (levels - 1), target));
+  }
+}
+
+}  // namespace
+
+const MapsProduct kIrradianceProduct = {
+    "irradiance", "An irradiance cube is ordered.", true,
+    [](const EnvironmentMapsParameters& parameters) { return parameters.irradiance.has_value(); },
+    order_irradiance};
+
+const MapsProduct kPrefilterProduct = {
+    "prefilter", "A prefiltered chain is ordered.", true,
+    [](const EnvironmentMapsParameters& parameters) { return parameters.prefilter.has_value(); },
+    order_prefilter};
+
+}  // namespace lightkiln

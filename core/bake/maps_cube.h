@@ -1,0 +1,40 @@
+#pragma once
+
+// Cubes that an environment is convolved into: an irradiance cube and the levels of a prefiltered
+// chain are the same work with another lobe, scale and name.
+
+#include <optional>
+
+#include "core/bake/maps_output.h"
+
+namespace lightkiln {
+
+class ConvolvedCube : public MapsOutput {
+ public:
+  // `alpha` none: the map itself, resampled by area. `scale` multiplies the average (pi:
+  // irradiance).
+  ConvolvedCube(MapsLight& light, int size, std::optional<double> alpha, double scale,
+                double target);
+
+  double error_bound() const override;
+  SpectrumNeed spectrum_need() const override;
+  double model_seconds(MapsLight& light) const override;
+  MeasuredError make(MapsLight& light, int check_texels, ByteWriter& writer,
+                     Progress& progress) const override;
+
+ protected:
+  int size() const { return size_; }
+  Image read(ByteReader& reader) const;
+
+ private:
+  Image make_cube(MapsLight& light, Progress& progress) const;
+  MeasuredError check(MapsLight& light, const Image& cube, int count, Progress& progress) const;
+
+  int size_;
+  std::optional<double> alpha_;
+  double scale_;
+  bool constant_;
+  LobePlan lobe_;  // empty when nothing is convolved
+};
+
+}  // namespace lightkiln

@@ -1,0 +1,34 @@
+#include "core/bake/maps_light.h"
+
+#include <algorithm>
+
+namespace lightkiln {
+
+MapsLight::MapsLight(Environment environment, int threads)
+    : environment_(std::move(environment)), threads_(threads) {}
+
+const LightStatistics& MapsLight::statistics() {
+  if (!statistics_) statistics_ = measure_light(environment_);
+  return *statistics_;
+}
+
+void MapsLight::require(int sh_bands, std::span<const LobePlan> lobes) {
+  sh_bands_ = sh_bands;
+  lobes_.assign(lobes.begin(), lobes.end());
+  spectrum_.reset();
+}
+
+int MapsLight::bands() const {
+  int bands = sh_bands_;
+  for (const LobePlan& lobe : lobes_) bands = std::max(bands, lobe.bands);
+  return bands;
+}
+
+const LatlongSpectrum& MapsLight::spectrum(Progress& progress) {
+  if (!spectrum_) {
+    spectrum_ = project_for(environment_, lobes_, std::max(1, sh_bands_), threads_, progress);
+  }
+  return *spectrum_;
+}
+
+}  // namespace lightkiln

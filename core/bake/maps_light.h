@@ -1,0 +1,41 @@
+#pragma once
+
+// What the outputs of one environment_maps bake share: the map as they see it, what is known of its
+// light, and its coefficients, each made when the first output asks for it.
+
+#include <optional>
+#include <span>
+
+#include "core/environment/prefilter.h"
+
+namespace lightkiln {
+
+class MapsLight {
+ public:
+  MapsLight(Environment environment, int threads);
+
+  const Environment& environment() const { return environment_; }
+  // Every texel is equal: no output needs statistics or coefficients.
+  bool constant() const { return environment_.constant; }
+  int threads() const { return threads_; }
+
+  const LightStatistics& statistics();
+  bool measured() const { return statistics_.has_value(); }
+
+  // What all outputs of the bake need together, so that coefficients do not depend on which output
+  // comes first.
+  void require(int sh_bands, std::span<const LobePlan> lobes);
+  // Bands that require() asked for; 0 = none.
+  int bands() const;
+  const LatlongSpectrum& spectrum(Progress& progress);
+
+ private:
+  Environment environment_;
+  int threads_;
+  std::optional<LightStatistics> statistics_;
+  int sh_bands_ = 0;
+  std::vector<LobePlan> lobes_;
+  std::optional<LatlongSpectrum> spectrum_;
+};
+
+}  // namespace lightkiln

@@ -1,0 +1,79 @@
+#include "core/bake/maps_output.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/image/exr.h"
+
+namespace lightkiln {
+
+std::span<const MapsProduct> maps_products() {
+  static const MapsProduct products[] = {kShProduct, kIrradianceProduct, kPrefilterProduct,
+                                         kDfgProduct};
+  return products;
+}
+
+MapsOutputs order_outputs(const EnvironmentMapsParameters& parameters, MapsLight& light,
+                          double target) {
+  MapsOutputs outputs;
+  for (const MapsProduct& product : maps_products()) {
+    if (product.ordered(parameters)) product.order(parameters, light, target, &outputs);
+  }
+  return outputs;
+}
+
+double working_target(double target_error) {
+  return 0.1 * target_error;
+}
+
+size_t check_index(int i, size_t all) {
+  constexpr double kGolden = 0.6180339887498949;
+  const double place = 0.5 + i * kGolden;
+  const size_t index = static_cast<size_t>((place - std::floor(place)) * static_cast<double>(all));
+  return std::min(index, all - 1);
+}
+
+void ErrorMeter::add(const Vec3d& value, const Vec3d& truth) {
+  double largest = 0;
+  for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(value[c] - truth[c]));
+  const double error = scale_ > 0 ? largest / scale_ : largest;
+  ++measured_.count;
+  squares_ += error * error;
+  measured_.max = std::max(measured_.max, error);
+}
+
+MeasuredError ErrorMeter::result() const {
+  MeasuredError measured = measured_;
+  if (measured.count > 0) measured.rms = std::sqrt(squares_ / static_cast<double>(measured.count));
+  return measured;
+}
+
+void judge_output(double bound, const MeasuredError& measured, double target, ChunkReport* report,
+                  Round* round) {
+  const double error = std::max(bound, measured.rms);
+  round->error_sum_sq += error * error;
+  round->error_max = std::max({round->error_max, bound, measured.max});
+  if (bound > target)
+    ++report->budget_limited;
+  else if (measured.max > target)
+    ++report->suspicious;
+  else
+    ++round->converged;
+}
+
+// Half-texel centres are what engines sample. OpenEXR's `envmap` attribute would claim centres on
+// the borders and is therefore not written; these attributes say what the file is.
+Artifact cube_artifact(const std::string& name, const Image& cube,
+                       std::map<std::string, std::string> attributes) {
+  ExrWriteOptions options;
+  options.pixel_type = ExrPixelType::float32;
+  options.attributes = std::move(attributes);
+  options.attributes.emplace("lightkiln.layout",
+                             "cube: six faces from the top, +X -X +Y -Y +Z -Z, as OpenEXR orients "
+                             "them");
+  options.attributes.emplace("lightkiln.texel_convention",
+                             "half_texel: texel centres at (i + 1/2)/N of a face");
+  return {name, "image", "image/x-exr", write_exr(cube, options)};
+}
+
+}  // namespace lightkiln

@@ -1,0 +1,94 @@
+#pragma once
+
+// One output of an environment_maps bake, and the table of products that order them. A product has
+// a file of its own, maps_<product>.cpp; the bake knows it by its row in maps_products() alone.
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/bake/kitchen.h"
+#include "core/bake/maps_light.h"
+
+namespace lightkiln {
+
+// What an output needs of the map's coefficients.
+struct SpectrumNeed {
+  int sh_bands = 0;                // at full accuracy
+  const LobePlan* lobe = nullptr;  // those of a convolution, as exact as its responses ask
+};
+
+class MapsOutput {
+ public:
+  virtual ~MapsOutput() = default;
+
+  // Stated before the work starts, in the unit of target_error: relative rms over the sphere.
+  virtual double error_bound() const = 0;
+  virtual SpectrumNeed spectrum_need() const { return {}; }
+  // CPU seconds on the model's core (maps_cost.h) beside those of the shared coefficients.
+  virtual double model_seconds(MapsLight& light) const = 0;
+  // Writes the output's values: a pure function of spec and inputs. `check_texels` of them (texels,
+  // coefficients or entries) are held against a slow double-precision twin; the result says by how
+  // much they differ. 0 = none.
+  virtual MeasuredError make(MapsLight& light, int check_texels, ByteWriter& writer,
+                             Progress& progress) const = 0;
+  // Reads what make() wrote and files it as artifacts and in the document.
+  virtual void file(ByteReader& reader, const MeasuredError& measured, Assembly* assembly,
+                    EnvironmentDocument* document) const = 0;
+};
+
+using MapsOutputs = std::vector<std::unique_ptr<MapsOutput>>;
+
+struct MapsProduct {
+  const char* name;    // the group of parameters that orders it, and its effect
+  const char* reason;  // for the plan, when it is ordered
+  bool depends_on_light;
+  bool (*ordered)(const EnvironmentMapsParameters& parameters);
+  // Appends its outputs, made to an error of `target` (a bound, see working_target()).
+  void (*order)(const EnvironmentMapsParameters& parameters, MapsLight& light, double target,
+                MapsOutputs* outputs);
+};
+
+// In the order of elements.
+std::span<const MapsProduct> maps_products();
+
+MapsOutputs order_outputs(const EnvironmentMapsParameters& parameters, MapsLight& light,
+                          double target);
+
+// The bound that an order of `target_error` is baked to. A bound is an rms over the sphere; a tenth
+// of the order leaves room for the single texel.
+double working_target(double target_error);
+
+// The i-th of `count` indices below `all` to hold against a twin: spread evenly at any count, by
+// the golden ratio.
+size_t check_index(int i, size_t all);
+
+// Differences relative to `scale`, gathered one by one.
+class ErrorMeter {
+ public:
+  explicit ErrorMeter(double scale) : scale_(scale) {}
+  void add(const Vec3d& value, const Vec3d& truth);
+  MeasuredError result() const;
+
+ private:
+  double scale_;
+  MeasuredError measured_;
+  double squares_ = 0;
+};
+
+// Enters an output into the books. It counts with the larger of what was promised and what was
+// seen; one whose texels err by more than the order, against what its bound says, is suspicious.
+void judge_output(double bound, const MeasuredError& measured, double target, ChunkReport* report,
+                  Round* round);
+
+// Artifacts that are cubes, as six faces in one strip, with text attributes saying so.
+Artifact cube_artifact(const std::string& name, const Image& cube,
+                       std::map<std::string, std::string> attributes);
+
+extern const MapsProduct kShProduct;
+extern const MapsProduct kIrradianceProduct;
+extern const MapsProduct kPrefilterProduct;
+extern const MapsProduct kDfgProduct;
+
+}  // namespace lightkiln

@@ -1,0 +1,63 @@
+#include "core/environment/brute_force.h"
+
+#include "core/sphere/direction_map.h"
+#include "core/sphere/quadrature.h"
+
+namespace lightkiln {
+
+// A texel is a box: along its row cos(m phi) integrates to (2/m) sin(m s/2) cos(m phi_centre), and
+// across it Gauss points of P_lm sin(theta), eight a row, are exact to the last digit as long as a
+// row spans less than a radian of the band. The standard library's Y_lm(theta, 0) carries the
+// Condon-Shortley phase, which is taken off.
+Vec3d projected_coefficient(const Environment& environment, int l, int m) {
+  constexpr int kPoints = 8;
+  static const GaussRule rule = gauss_legendre(kPoints);
+  const Image& map = environment.radiance;
+  const int order = std::abs(m);
+  const double step = 2 * kPi / map.width, row_step = kPi / map.height;
+  const double box = order > 0 ? 2 * std::sin(order * step / 2) / order : step;
+  const double scale = (order % 2 == 1 ? -1.0 : 1.0) * (order > 0 ? std::sqrt(2.0) : 1.0) * box;
+  std::vector<double> wave(static_cast<size_t>(map.width));
+  for (size_t x = 0; x < wave.size(); ++x) {
+    const double phi = kPi - (static_cast<double>(x) + 0.5) * step;
+    wave[x] = m < 0 ? std::sin(order * phi) : std::cos(order * phi);
+  }
+  Vec3d sum;
+  for (int y = 0; y < map.height; ++y) {
+    double height = 0;
+    for (size_t k = 0; k < kPoints; ++k) {
+      const double theta = (y + 0.5 + 0.5 * rule.nodes[k]) * row_step;
+      height += 0.5 * row_step * rule.weights[k] * std::sin(theta) *
+                std::sph_legendre(static_cast<unsigned>(l), static_cast<unsigned>(order), theta);
+    }
+    Vec3d row;
+    for (size_t x = 0; x < wave.size(); ++x) {
+      row += to_double(map.rgb(static_cast<int>(x), y)) * wave[x];
+    }
+    sum += row * (height * scale);
+  }
+  return sum;
+}
+
+Vec3d texel_average(const Environment& environment, int face, int x, int y, int size) {
+  constexpr int kCuts = 200;
+  const Image& map = environment.radiance;
+  Vec3d sum;
+  double all = 0;
+  for (int j = 0; j < kCuts; ++j) {
+    for (int i = 0; i < kCuts; ++i) {
+      const double s = (x + (i + 0.5) / kCuts) / size, t = (y + (j + 0.5) / kCuts) / size;
+      const double a = 2 * s - 1, b = 2 * t - 1;
+      const double weight = 1 / ((1 + a * a + b * b) * std::sqrt(1 + a * a + b * b));
+      double u = 0, v = 0;
+      latlong_coordinates(cube_direction(face, s, t), &u, &v);
+      const int column = std::min(static_cast<int>(u * map.width), map.width - 1);
+      const int row = std::min(static_cast<int>(v * map.height), map.height - 1);
+      sum += to_double(map.rgb(column, row)) * weight;
+      all += weight;
+    }
+  }
+  return sum / all;
+}
+
+}  // namespace lightkiln

@@ -1,0 +1,59 @@
+#include "core/environment/brute_force.h"
+
+#include <gtest/gtest.h>
+
+#include "core/environment/ggx_lobe.h"
+#include "core/sphere/harmonic_transform.h"
+#include "tests/reference/sphere_twins.h"
+
+namespace lightkiln {
+namespace {
+
+Environment sky_of(int height, double sun) {
+  DecodedImage decoded;
+  decoded.image = reference::test_sky(height, sun);
+  return make_environment(decoded);
+}
+
+TEST(BruteForce, AgreesWithAnIndependentSumForEveryWidthOfLobe) {
+  const Environment sky = sky_of(48, 1e3);
+  for (const double alpha : {0.05, 0.25, 1.0}) {
+    for (const Vec3d& axis : {Vec3d{0.48, 0.6, 0.64}, Vec3d{0, 1, 0}, Vec3d{-0.6, -0.8, 0}}) {
+      const Vec3d ours = lobe_average(sky, GgxLobe(alpha), alpha, axis);
+      const Vec3d theirs = reference::prefilter(sky.radiance, alpha, axis);
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(ours[c] / theirs[c], 1, 2e-4) << alpha << " " << c;
+    }
+  }
+}
+
+// A lobe's average of a constant is that constant: its weights sum to 1, also where a texel is
+// wider than the lobe.
+TEST(BruteForce, KeepsAConstant) {
+  Environment grey = sky_of(64, 1);
+  for (float& v : grey.radiance.pixels) v = 0.5f;
+  for (const double alpha : {0.01, 0.1, 0.5, 1.0}) {
+    const Vec3d average = lobe_average(grey, GgxLobe(alpha), alpha, normalize(Vec3d{1, -2, 3}));
+    EXPECT_NEAR(average.y, 0.5, 2e-5) << alpha;
+  }
+}
+
+TEST(BruteForce, ProjectsOneCoefficientAtATime) {
+  const Environment sky = sky_of(32, 100);
+  Progress progress;
+  const LatlongSpectrum spectrum = project_latlong(sky.radiance, 20, 8, 1, progress);
+  for (const auto& [l, m] : {std::pair{0, 0}, {1, -1}, {1, 1}, {7, -4}, {19, 19}, {19, -1}}) {
+    const double* at = &spectrum.coefficients[spectrum.offset(l, std::abs(m))] + (m < 0 ? 3 : 0);
+    const Vec3d truth = projected_coefficient(sky, l, m);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(at[c], truth[c], 1e-9 * spectrum.coefficients[0]);
+  }
+}
+
+TEST(BruteForce, AveragesATexelOfACube) {
+  const Environment sky = sky_of(32, 10);
+  const Vec3d ours = texel_average(sky, 2, 1, 3, 4);
+  const Vec3d theirs = reference::cube_texel_mean(sky.radiance, 2, 1, 3, 4, 333);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(ours[c] / theirs[c], 1, 2e-3);
+}
+
+}  // namespace
+}  // namespace lightkiln
