@@ -42,6 +42,9 @@ LatlongSpectrum project_latlong(const Image& image, int bands, int gauss_points,
 // The first `bands` bands in the world frame (polar axis +Z).
 ShRgb world_harmonics(const LatlongSpectrum& spectrum, int bands);
 
+// The way back: latlong_spectrum(world_harmonics(s, s.bands)) is s up to rounding.
+LatlongSpectrum latlong_spectrum(const ShRgb& world);
+
 // sum over m of the squared coefficients of each band, per channel.
 std::vector<Vec3d> band_energy(const LatlongSpectrum& spectrum);
 
@@ -58,11 +61,14 @@ class RingGrid {
   int rings() const { return rings_; }
   int longitudes() const { return longitudes_; }
   void set(int ring, int longitude, const float rgb[3]);
+  const float* at(int ring, int longitude) const;  // R, G, B
   // Fills the margins that interpolation reads: wrapped in longitude, mirrored with half a turn
   // beyond the poles. To be called once every point is set.
   void close();
   // Lagrange interpolation of degree kTaps - 1 in both angles at a unit direction.
   Vec3d interpolate(const Vec3d& direction) const;
+  // The direction of a point of the grid.
+  Vec3d direction(int ring, int longitude) const;
   // The largest error of interpolating a harmonic of band l and unit amplitude.
   static double interpolation_error(int l, int rings, int longitudes);
 

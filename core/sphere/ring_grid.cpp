@@ -56,6 +56,16 @@ void RingGrid::set(int ring, int longitude, const float rgb[3]) {
   std::copy_n(rgb, 3, &pixels_[4 * (row + static_cast<size_t>(longitude + kMargin))]);
 }
 
+const float* RingGrid::at(int ring, int longitude) const {
+  const size_t row = static_cast<size_t>(ring + kMargin) * static_cast<size_t>(stride_);
+  return &pixels_[4 * (row + static_cast<size_t>(longitude + kMargin))];
+}
+
+Vec3d RingGrid::direction(int ring, int longitude) const {
+  const double theta = kPi * (ring + 0.5) / rings_, phi = 2 * kPi * longitude / longitudes_;
+  return {std::sin(theta) * std::sin(phi), std::cos(theta), std::sin(theta) * std::cos(phi)};
+}
+
 void RingGrid::close() {
   const size_t stride = 4 * static_cast<size_t>(stride_);
   const auto row = [&](int ring) { return &pixels_[static_cast<size_t>(ring + kMargin) * stride]; };

@@ -9,6 +9,7 @@
 #include "core/sphere/direction_map.h"
 #include "core/sphere/fourier.h"
 #include "core/sphere/quadrature.h"
+#include "core/sphere/row_spectra.h"
 #include "core/sphere/solid_angle.h"
 #include "tests/reference/sphere_twins.h"
 
@@ -204,12 +205,40 @@ TEST(HarmonicTransform, ComesBackOnRingsAndBetweenThem) {
   }
 }
 
+// Few bands are summed directly, many by fast transforms: the same integrals, in every order.
+TEST(HarmonicTransform, SumsRowsDirectlyAndByTransformsAlike) {
+  Progress progress;
+  for (const int height : {2, 6, 50, 75}) {
+    Image sky = reference::test_sky(height, 1e3);
+    if (sky.width % 4 != 0) continue;
+    const RowSpectra direct = row_spectra(sky, 40, 1, progress, RowMethod::direct);
+    const RowSpectra fourier = row_spectra(sky, 40, 1, progress, RowMethod::fourier);
+    ASSERT_EQ(direct.values.size(), fourier.values.size());
+    for (size_t i = 0; i < direct.values.size(); ++i) {
+      for (int lane = 0; lane < kLanes; ++lane) {
+        ASSERT_NEAR(direct.values[i][lane], fourier.values[i][lane], 1e-9) << height << " " << i;
+      }
+    }
+  }
+}
+
+TEST(HarmonicTransform, ComesBackFromTheWorldFrame) {
+  Progress progress;
+  const LatlongSpectrum spectrum = project_latlong(reference::test_sky(20, 50), 12, 4, 1, progress);
+  const LatlongSpectrum again = latlong_spectrum(world_harmonics(spectrum, 12));
+  for (size_t i = 0; i < spectrum.coefficients.size(); ++i) {
+    EXPECT_NEAR(again.coefficients[i], spectrum.coefficients[i], 1e-12);
+  }
+}
+
 TEST(HarmonicTransform, GivesTheSameBitsForAnyNumberOfThreads) {
   const Image sky = reference::test_sky(50, 1e4);
   Progress progress;
   const LatlongSpectrum one = project_latlong(sky, 60, 3, 1, progress);
+  const LatlongSpectrum few = project_latlong(sky, 7, 3, 1, progress);
   for (const int threads : {2, 3, 8}) {
     EXPECT_EQ(one.coefficients, project_latlong(sky, 60, 3, threads, progress).coefficients);
+    EXPECT_EQ(few.coefficients, project_latlong(sky, 7, 3, threads, progress).coefficients);
   }
 }
 
