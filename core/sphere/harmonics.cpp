@@ -8,6 +8,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "core/sphere/quadrature.h"
+
 namespace lightkiln {
 
 // With normalised Legendre functions P, the basis is
@@ -63,6 +65,38 @@ double clamped_cosine_band(int l) {
   for (int k = 1; k <= l / 2; ++k) central *= (2.0 * k - 1) / (2.0 * k);
   const double sign = (l / 2) % 2 == 1 ? 1 : -1;
   return 2 * kPi * sign / ((l + 2.0) * (l - 1.0)) * central;
+}
+
+// The Funk-Hecke theorem: a zonal kernel multiplies band l by 2 pi int k P_l.
+std::vector<double> zonal_bands(const std::function<double(double cosine)>& kernel, int bands,
+                                double lowest_cosine) {
+  assert(bands >= 1 && lowest_cosine < 1);
+  const GaussRule rule = gauss_legendre(bands / 2 + 65);
+  const double half = 0.5 * (1 - lowest_cosine), middle = 0.5 * (1 + lowest_cosine);
+  std::vector<double> factors(static_cast<size_t>(bands));
+  for (size_t i = 0; i < rule.nodes.size(); ++i) {
+    const double t = middle + half * rule.nodes[i];
+    const double weight = 2 * kPi * half * rule.weights[i] * kernel(t);
+    double before = 0, value = 1;
+    for (int l = 0; l < bands; ++l) {
+      factors[static_cast<size_t>(l)] += weight * value;
+      const double next = ((2 * l + 1) * t * value - l * before) / (l + 1);
+      before = value;
+      value = next;
+    }
+  }
+  return factors;
+}
+
+ShRgb sh_convolve(const ShRgb& sh, std::span<const double> band_factors) {
+  assert(band_factors.size() >= static_cast<size_t>(sh.bands));
+  ShRgb result = sh;
+  for (int l = 0; l < sh.bands; ++l) {
+    for (int m = -l; m <= l; ++m) {
+      result.coefficients[sh_index(l, m)] *= band_factors[static_cast<size_t>(l)];
+    }
+  }
+  return result;
 }
 
 Vec3d sh_irradiance(const ShRgb& radiance, const Vec3d& normal) {

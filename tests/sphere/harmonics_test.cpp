@@ -182,6 +182,25 @@ TEST(Harmonics, KnowTheClampedCosine) {
   EXPECT_NEAR(energy * 1.5 * kPi, 511.0 / 512, 1e-12);
 }
 
+TEST(Harmonics, MultiplyByAnyZonalKernel) {
+  const auto cosine = zonal_bands([](double t) { return t; }, 129, 0);
+  for (int l = 0; l < 129; ++l) {
+    EXPECT_NEAR(cosine[static_cast<size_t>(l)], clamped_cosine_band(l), 1e-12) << l;
+  }
+  // A delta seen through a kernel is the kernel about its direction: (1 + t)^2, of degree 2.
+  const auto soft = zonal_bands([](double t) { return (1 + t) * (1 + t); }, 6);
+  const Vec3d d = normalize(Vec3d{0.3, -0.7, 0.2});
+  const auto values = basis_at(d, 6);
+  ShRgb delta(6);
+  for (size_t i = 0; i < values.size(); ++i) delta.coefficients[i] = Vec3d{1, 2, 3} * values[i];
+  const ShRgb seen = sh_convolve(delta, soft);
+  for (uint32_t i = 0; i < 8; ++i) {
+    const Vec3d n = random_direction(8, i);
+    const double expected = (1 + dot(n, d)) * (1 + dot(n, d));
+    EXPECT_NEAR(sh_evaluate(seen, n).y, 2 * expected, 1e-13);
+  }
+}
+
 // A sky of radiance 1 above the horizon and 0 below: (pi/2)(1 + n.up), exact already with two
 // bands.
 TEST(Harmonics, GiveTheHemisphereSkyExactIrradiance) {
