@@ -17,11 +17,14 @@ double corner_solid_angle(double x, double y) {
 
 // Four terms in double: on a face of 4096 texels the cancellation leaves 1e-9 of a texel, and the
 // terms telescope, so that the faces sum to 4 pi.
-double cube_texel_solid_angle(int x, int y, int size) {
-  const double x0 = 2.0 * x / size - 1, x1 = 2.0 * (x + 1) / size - 1;
-  const double y0 = 2.0 * y / size - 1, y1 = 2.0 * (y + 1) / size - 1;
+double plane_solid_angle(double x0, double x1, double y0, double y1) {
   return corner_solid_angle(x1, y1) - corner_solid_angle(x0, y1) - corner_solid_angle(x1, y0) +
          corner_solid_angle(x0, y0);
+}
+
+double cube_texel_solid_angle(int x, int y, int size) {
+  return plane_solid_angle(2.0 * x / size - 1, 2.0 * (x + 1) / size - 1, 2.0 * y / size - 1,
+                           2.0 * (y + 1) / size - 1);
 }
 
 // Exact: the row spans colatitudes [t0, t1], and cos t0 - cos t1 = 2 sin((t0+t1)/2) sin((t1-t0)/2),

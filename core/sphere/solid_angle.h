@@ -10,6 +10,9 @@ namespace lightkiln {
 // 1e-12.
 double cube_texel_solid_angle(int x, int y, int size);
 
+// The rectangle [x0, x1] x [y0, y1] of a plane at distance 1.
+double plane_solid_angle(double x0, double x1, double y0, double y1);
+
 // Any texel of row y of a lat-long image; all rows times their widths sum to 4 pi within 1e-12.
 double latlong_texel_solid_angle(int y, int width, int height);
 

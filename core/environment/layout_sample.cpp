@@ -1,0 +1,66 @@
+#include "core/environment/layout_sample.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/sphere/cube_cross.h"
+#include "core/sphere/radial_map.h"
+
+namespace lightkiln {
+
+namespace {
+
+int floor_to_int(double value) {
+  const int truncated = static_cast<int>(value);
+  return value < truncated ? truncated - 1 : truncated;
+}
+
+// All four samples around (x, y) lie in the image and in the face, and show something.
+bool is_interior(const MapLayout& layout, int chart, int x, int y) {
+  if (is_cube(layout.kind)) {
+    const int size = cube_face_size(layout);
+    const FacePlace face = face_place(layout.kind, chart - 1);
+    const int i = x - face.column * size, j = y - face.row * size;
+    return i >= 0 && j >= 0 && i + 1 < size && j + 1 < size;
+  }
+  if (x < 0 || y < 0 || x + 1 >= layout.width || y + 1 >= layout.height) return false;
+  if (!is_radial(layout.kind)) return true;
+  const double right = 2 * (x + 1.0) / layout.width - 1, down = 2 * (y + 1.0) / layout.height - 1;
+  const double safe = 1 - 2.0 / layout.width;
+  return safe > 0 && right * right + down * down < safe * safe;
+}
+
+}  // namespace
+
+Vec3d nearest_radiance(const MapLayout& layout, const Image& image, const MapPlace& place) {
+  const int x = std::clamp(static_cast<int>(place.x), 0, layout.width - 1);
+  const int y = std::clamp(static_cast<int>(place.y), 0, layout.height - 1);
+  return to_double(image.rgb(x, y));
+}
+
+Vec3d smooth_radiance(const MapLayout& layout, const Image& image, const MapPlace& place) {
+  const double px = place.x - 0.5, py = place.y - 0.5;
+  const int x = floor_to_int(px), y = floor_to_int(py);
+  const double fx = px - x, fy = py - y;
+  if (is_interior(layout, place.chart, x, y)) {
+    const float* top = image.at(x, y);
+    const float* bottom = image.at(x, y + 1);
+    const double a = (1 - fx) * (1 - fy), b = fx * (1 - fy), c = (1 - fx) * fy, d = fx * fy;
+    return {
+        a * double(top[0]) + b * double(top[3]) + c * double(bottom[0]) + d * double(bottom[3]),
+        a * double(top[1]) + b * double(top[4]) + c * double(bottom[1]) + d * double(bottom[4]),
+        a * double(top[2]) + b * double(top[5]) + c * double(bottom[2]) + d * double(bottom[5])};
+  }
+  Vec3d sum;
+  double total = 0;
+  for (int k = 0; k < 4; ++k) {
+    int i = x + (k & 1), j = y + (k >> 1);
+    const double weight = ((k & 1) != 0 ? fx : 1 - fx) * ((k >> 1) != 0 ? fy : 1 - fy);
+    if (weight <= 0 || !continue_texel(layout, place.chart, &i, &j)) continue;
+    sum += to_double(image.rgb(i, j)) * weight;
+    total += weight;
+  }
+  return total > 0 ? sum / total : nearest_radiance(layout, image, place);
+}
+
+}  // namespace lightkiln
