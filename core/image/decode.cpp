@@ -69,6 +69,47 @@ DecodedImage decode_hdr_image(std::span<const std::byte> bytes) {
                   found_instead(bytes) + ".");
 }
 
+DecodedImage decode_light_image(std::span<const std::byte> bytes) {
+  const bool ldr = begins_with(bytes, "\x89PNG") || begins_with(bytes, "\xff\xd8\xff");
+  if (ldr) return read_ldr_as_light(bytes);
+  const bool hdr = begins_with(bytes, "\x76\x2f\x31\x01") || begins_with(bytes, "#?");
+  if (!hdr) {
+    throw Error(ErrorCode::invalid_input,
+                "The environment image must be OpenEXR, Radiance HDR, PNG or JPEG; this is " +
+                    found_instead(bytes) + ".");
+  }
+  DecodedImage decoded = decode_hdr_image(bytes);
+  frame_as_displayed(decoded);
+  return decoded;
+}
+
+void frame_as_displayed(DecodedImage& decoded) {
+  if (!decoded.display || decoded.envmap != EnvmapAttribute::none) return;
+  const PixelWindow frame = *decoded.display;
+  const Image& source = decoded.image;
+  check_image_size(frame.width, frame.height, "The display window of an OpenEXR image");
+  const int64_t left = std::max<int64_t>(frame.x, 0), top = std::max<int64_t>(frame.y, 0);
+  const int64_t right = std::min<int64_t>(frame.x + frame.width, source.width);
+  const int64_t bottom = std::min<int64_t>(frame.y + frame.height, source.height);
+  if (right <= left || bottom <= top) {
+    throw Error(ErrorCode::invalid_input,
+                "The OpenEXR image holds no pixel of its display window: a map is read from the "
+                "display window, unless the attribute envmap says that the data window is the "
+                "map.");
+  }
+  Image framed(static_cast<int>(frame.width), static_cast<int>(frame.height), source.channels);
+  for (int64_t y = top; y < bottom; ++y) {
+    const float* from = source.at(static_cast<int>(left), static_cast<int>(y));
+    std::copy_n(from, static_cast<size_t>(right - left) * static_cast<size_t>(source.channels),
+                framed.at(static_cast<int>(left - frame.x), static_cast<int>(y - frame.y)));
+  }
+  const auto common = static_cast<uint64_t>((right - left) * (bottom - top));
+  decoded.pixels_missing = static_cast<uint64_t>(frame.width * frame.height) - common;
+  decoded.pixels_outside = static_cast<uint64_t>(int64_t{source.width} * source.height) - common;
+  decoded.image = std::move(framed);
+  decoded.display.reset();
+}
+
 PixelRepairs sanitise(Image& image) {
   PixelRepairs repairs;
   for (float& value : image.pixels) {

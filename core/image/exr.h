@@ -13,12 +13,6 @@
 
 namespace lightkiln {
 
-struct DecodedImage {
-  Image image;                                     // linear Rec. 709, 1 or 3 channels
-  EnvmapAttribute envmap = EnvmapAttribute::none;  // what the file says of its layout
-  std::string format;                              // "OpenEXR, 32-bit float, ZIP", for reports
-};
-
 enum class ExrPixelType { half, float32 };
 
 struct ExrWriteOptions {

@@ -185,6 +185,15 @@ EnvmapAttribute exr_envmap(const Imf::Header& header) {
          "The OpenEXR attribute envmap holds a layout that is neither lat-long nor cube.");
 }
 
+std::optional<PixelWindow> exr_display(const Imf::Header& header) {
+  const Box2i& data = header.dataWindow();
+  const Box2i& display = header.displayWindow();
+  if (data == display) return std::nullopt;
+  return PixelWindow{int64_t{display.min.x} - data.min.x, int64_t{display.min.y} - data.min.y,
+                     int64_t{display.max.x} - display.min.x + 1,
+                     int64_t{display.max.y} - display.min.y + 1};
+}
+
 std::string exr_format(const Imf::Header& header, ExrColors colors) {
   const Imf::Channel* first = header.channels().findChannel(colors == ExrColors::rgb ? "R" : "Y");
   std::string format = "OpenEXR, ";

@@ -3,6 +3,7 @@
 // Which part of an OpenEXR file is read, and what its header says of it. Included by exr_*.cpp
 // only.
 
+#include <optional>
 #include <string>
 
 #include <ImfHeader.h>
@@ -35,6 +36,9 @@ Primaries exr_primaries(const Imf::Header& header);
 
 // Throws Error{invalid_input} for a value that OpenEXR does not know.
 EnvmapAttribute exr_envmap(const Imf::Header& header);
+
+// The display window from the data window's corner; none when they are the same.
+std::optional<PixelWindow> exr_display(const Imf::Header& header);
 
 // "OpenEXR, 16-bit float, ZIP, tiled", for reports.
 std::string exr_format(const Imf::Header& header, ExrColors colors);

@@ -130,6 +130,7 @@ DecodedImage read_checked(std::span<const std::byte> bytes) {
   DecodedImage decoded;
   decoded.envmap = exr_envmap(header);
   decoded.format = exr_format(header, open.part.colors);
+  decoded.display = exr_display(header);
   if (open.part.colors == ExrColors::luminance_chroma) {
     if (open.file.parts() > 1) {
       throw Error(ErrorCode::unsupported,

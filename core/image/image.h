@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -60,5 +61,23 @@ struct PixelRepairs {
 
 // The layout a file claims through OpenEXR's `envmap` attribute.
 enum class EnvmapAttribute { none, latlong, cube };
+
+// A rectangle of pixels, in pixels of the image that it belongs to: (0, 0) is its upper left one.
+struct PixelWindow {
+  int64_t x = 0, y = 0;
+  int64_t width = 0, height = 0;
+};
+
+struct DecodedImage {
+  Image image;                                     // linear Rec. 709, 1 or 3 channels
+  EnvmapAttribute envmap = EnvmapAttribute::none;  // what the file says of its layout
+  std::string format;                              // "OpenEXR, 32-bit float, ZIP", for reports
+  // OpenEXR's display window, when it is not the image itself (the data window).
+  std::optional<PixelWindow> display;
+  bool display_referred = false;  // made for a screen: nothing is brighter than 1
+  // Set by frame_as_displayed().
+  uint64_t pixels_missing = 0;  // of the display window, that the file does not hold: black
+  uint64_t pixels_outside = 0;  // of the file, outside its display window: dropped
+};
 
 }  // namespace lightkiln

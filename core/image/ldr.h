@@ -23,6 +23,12 @@ struct Image8 {
 // malformed, cut short or (PNG) with a wrong checksum, too_large above the limits of image.h.
 Image8 read_ldr(std::span<const std::byte> bytes);
 
+// The same files as light: sRGB to linear, values in [0, 1], three channels; all 16 bits of a
+// 16-bit PNG count. Alpha is dropped, an embedded colour profile ignored. Throws Error as read_ldr,
+// and unsupported for a JPEG of four components (CMYK) and a PNG that states another gamma than
+// sRGB's.
+DecodedImage read_ldr_as_light(std::span<const std::byte> bytes);
+
 // Grey, grey and alpha, RGB or RGBA by the number of channels. Equal pixels give equal bytes.
 std::vector<std::byte> write_png(const Image8& image);
 

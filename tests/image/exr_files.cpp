@@ -92,7 +92,15 @@ Imf::Header header_of(const Image& image, const ExrRecipe& recipe) {
   const Imath::Box2i window(
       {recipe.window_x, recipe.window_y},
       {recipe.window_x + image.width - 1, recipe.window_y + image.height - 1});
-  Imf::Header header(window, window);
+  Imath::Box2i display = window;
+  if (recipe.display) {
+    display.min = window.min + Imath::V2i(static_cast<int>(recipe.display->x),
+                                          static_cast<int>(recipe.display->y));
+    display.max = display.min + Imath::V2i(static_cast<int>(recipe.display->width) - 1,
+                                           static_cast<int>(recipe.display->height) - 1);
+  }
+  Imf::Header header(display, window);
+  if (recipe.envmap_latlong) Imf::addEnvmap(header, Imf::ENVMAP_LATLONG);
   header.compression() = compression_named(recipe.compression);
   if (recipe.decreasing_lines) header.lineOrder() = Imf::DECREASING_Y;
   if (recipe.primaries) {

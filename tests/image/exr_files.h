@@ -20,6 +20,9 @@ struct ExrRecipe {
   ExrSamples samples = ExrSamples::half;
   ExrStorage storage = ExrStorage::scan_lines;
   int window_x = 0, window_y = 0;  // the data window's corner
+  // Where it lies from the data window's corner, and its size; none = the data window.
+  std::optional<PixelWindow> display;
+  bool envmap_latlong = false;  // the attribute `envmap`
   bool decreasing_lines = false;
   bool second_part = false;  // a first part with channel Z only, the image in a second part
   std::vector<std::string> extra_channels;  // of the same samples, filled with 7
