@@ -20,7 +20,18 @@ struct Texel {
 // The map as a graph and as a measure.
 class LatlongGrid {
  public:
-  explicit LatlongGrid(const Image& image) : image_(image) {}
+  // The image must outlive this object; its pixels may change, its size not.
+  explicit LatlongGrid(const Image& image) : image_(image) {
+    for (int x = 0; x < image.width; ++x) {
+      columns_.push_back(latlong_direction((x + 0.5) / image.width, 0.5));
+    }
+    for (int y = 0; y < image.height; ++y) {
+      const Vec3d d = latlong_direction(0, (y + 0.5) / image.height);
+      const Vec3d m = latlong_texel_moment(0, y, image.width, image.height);
+      rows_.push_back({std::hypot(d.x, d.z), d.y, std::hypot(m.x, m.z), m.y,
+                       latlong_texel_solid_angle(y, image.width, image.height)});
+    }
+  }
 
   int width() const { return image_.width; }
   int height() const { return image_.height; }
@@ -29,14 +40,16 @@ class LatlongGrid {
   }
   double luminance_at(Texel t) const { return luminance(to_double(image_.rgb(t.x, t.y))); }
   Vec3d radiance(Texel t) const { return to_double(image_.rgb(t.x, t.y)); }
+  // Of the texel's centre.
   Vec3d direction(Texel t) const {
-    return latlong_direction((t.x + 0.5) / image_.width, (t.y + 0.5) / image_.height);
+    const Row& row = rows_[static_cast<size_t>(t.y)];
+    return along(t.x, row.sine, row.cosine);
   }
-  double solid_angle(Texel t) const {
-    return latlong_texel_solid_angle(t.y, image_.width, image_.height);
-  }
+  double solid_angle(Texel t) const { return rows_[static_cast<size_t>(t.y)].solid_angle; }
+  // The integral of direction over the texel.
   Vec3d moment(Texel t) const {
-    return latlong_texel_moment(t.x, t.y, image_.width, image_.height);
+    const Row& row = rows_[static_cast<size_t>(t.y)];
+    return along(t.x, row.outward, row.upward);
   }
   // Longitudes wrap; past a pole lies the same row half a turn away.
   std::array<Texel, 8> neighbours(Texel t) const {
@@ -57,7 +70,19 @@ class LatlongGrid {
   }
 
  private:
+  struct Row {
+    double sine, cosine;     // of the colatitude of texel centres
+    double outward, upward;  // parts of a texel's moment
+    double solid_angle;
+  };
+  Vec3d along(int x, double outward, double upward) const {
+    const Vec3d& column = columns_[static_cast<size_t>(x)];
+    return {column.x * outward, upward, column.z * outward};
+  }
+
   const Image& image_;
+  std::vector<Vec3d> columns_;  // on the horizon
+  std::vector<Row> rows_;
 };
 
 // Between unit vectors, in radians; exact for small angles too.

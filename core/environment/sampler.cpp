@@ -116,4 +116,39 @@ float EnvironmentSampler::pdf(const Vec3& direction) const {
   return static_cast<float>(texel_pdf(x, y));
 }
 
+// Karlik, Sik, Vevoda, Skrivan and Krivanek, "MIS Compensation: Optimizing Sampling Techniques in
+// Multiple Importance Sampling", SIGGRAPH Asia 2019: two techniques with half of the samples each
+// have the least variance where (p + q) / 2 is proportional to the integrand, so that the free one
+// is p = max(0, 2 b f / F - q), with b such that it integrates to 1. The other follows the surface,
+// whose directions are not known here: over all of them it is uniform, q = 1 / 4pi, and with
+// f / F = L / (4pi m), m the mean luminance,
+//   p = max(0, L - t) / (4pi t),  t = m / 2b,  where  mean max(0, L - t) = t.
+// The left side minus the right is convex and falls in t: Newton's steps from 0 rise to the root.
+double mis_compensation_floor(const Environment& environment) {
+  const Image& image = environment.radiance;
+  double floor = 0;
+  for (int round = 0; round < 64; ++round) {
+    double over = 0, share = 0;  // mean excess; part of the sphere that exceeds
+    for (int y = 0; y < image.height; ++y) {
+      double excess = 0;
+      int count = 0;
+      for (int x = 0; x < image.width; ++x) {
+        const double l = luminance(to_double(image.rgb(x, y)));
+        if (l <= floor) continue;
+        excess += l - floor;
+        ++count;
+      }
+      const double weight = latlong_texel_solid_angle(y, image.width, image.height) / (4 * kPi);
+      over += excess * weight;
+      share += count * weight;
+    }
+    const double next = floor + (over - floor) / (share + 1);
+    if (!(next > floor)) break;
+    const bool settled = next - floor < 1e-12 * next;
+    floor = next;
+    if (settled) break;
+  }
+  return floor;
+}
+
 }  // namespace lightkiln

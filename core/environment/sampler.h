@@ -1,8 +1,8 @@
 #pragma once
 
 // Draws directions in proportion to an environment's luminance, or to what of it exceeds a floor,
-// exactly: a texel by its luminance
-// times its true solid angle, then a point of its spherical rectangle uniform in solid angle.
+// exactly: a texel by its luminance times its true solid angle, then a point of its spherical
+// rectangle uniform in solid angle.
 
 #include <cstdint>
 #include <vector>
@@ -13,7 +13,8 @@ namespace lightkiln {
 
 class EnvironmentSampler {
  public:
-  // Texels of luminance `floor` and under are never drawn.
+  // The density follows max(0, luminance - floor): texels at the floor and under are never drawn,
+  // so that a floor above 0 needs a second technique that reaches them.
   explicit EnvironmentSampler(const Environment& environment, double floor = 0);
 
   struct Sample {
@@ -36,5 +37,10 @@ class EnvironmentSampler {
   std::vector<double> texel_cdf_;  // height rows of width + 1, each row normalised
   double texel_pdf(int x, int y) const;
 };
+
+// The floor for a sampler that shares its samples half and half with another technique under the
+// balance heuristic (MIS compensation): it leaves to the other what that one samples well enough.
+// At most the mean luminance, at least half of it; 0 for a black map.
+double mis_compensation_floor(const Environment& environment);
 
 }  // namespace lightkiln

@@ -1,30 +1,26 @@
 #include "core/environment/sampler.h"
 
 #include <cmath>
-#include <map>
 
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/base/statistics.h"
+#include "core/environment/light_cells.h"
 #include "core/image/decode.h"
 #include "core/sphere/direction_map.h"
 #include "core/sphere/solid_angle.h"
+#include "tests/environment/made_maps.h"
 #include "tests/reference/sphere_twins.h"
 #include "tests/support/data.h"
 
 namespace lightkiln {
 namespace {
 
-Environment environment_of(const Image& image) {
-  DecodedImage decoded;
-  decoded.image = image;
-  return make_environment(decoded);
-}
+using test::environment_of;
 
 Image map_of(int height, float value) {
-  Image map(2 * height, height, 3);
-  for (float& v : map.pixels) v = value;
-  return map;
+  return test::map_of(height, {value, value, value});
 }
 
 // The upper tail of chi-square by Wilson and Hilferty's cube root.
@@ -112,44 +108,51 @@ TEST(Sampler, WouldFailTheTestWithATiltedDraw) {
 }
 
 // Exact on any map, texel by texel: counts of the texels that hold the drawn directions against
-// the probabilities that pdf() times the texel's solid angle states.
-double texel_chi_square(const Environment& environment) {
-  const EnvironmentSampler sampler(environment);
+// what their luminance above the floor and their solid angle give them; the density that comes
+// with each draw against the same.
+double texel_chi_square(const Environment& environment, double floor = 0) {
+  const EnvironmentSampler sampler(environment, floor);
   const Image& map = environment.radiance;
+  std::vector<double> shares, counts(map.pixels.size() / 3);
+  double total = 0;
+  for (int y = 0; y < map.height; ++y) {
+    const double omega = latlong_texel_solid_angle(y, map.width, map.height);
+    for (int x = 0; x < map.width; ++x) {
+      shares.push_back(std::max(0.0, luminance(to_double(map.rgb(x, y))) - floor) * omega);
+      total += shares.back();
+    }
+  }
   constexpr int kDraws = 60000;
-  std::map<std::pair<int, int>, double> seen;
+  int wrong = 0;
   for (uint64_t i = 0; i < kDraws; ++i) {
     const float a = to_unit_float(static_cast<uint32_t>(hash64(7000001 + 2 * i)));
     const float b = to_unit_float(static_cast<uint32_t>(hash64(7000002 + 2 * i)));
     const auto sample = sampler.sample(a, b);
     double u = 0, v = 0;
     latlong_coordinates(to_double(sample.direction), &u, &v);
-    seen[{static_cast<int>(u * map.width),
-          std::min(map.height - 1, static_cast<int>(v * map.height))}] += 1;
-    EXPECT_GT(sample.pdf, 0);
-    EXPECT_TRUE(std::isfinite(sample.pdf));
-  }
-  double statistic = 0, rest_seen = 0, rest_expected = 0, total = 0;
-  int degrees = -1;
-  for (int y = 0; y < map.height; ++y) {
+    const int x = static_cast<int>(u * map.width);
+    const int y = std::min(map.height - 1, static_cast<int>(v * map.height));
+    const auto texel = static_cast<size_t>(y * map.width + x);
+    counts[texel] += 1;
     const double omega = latlong_texel_solid_angle(y, map.width, map.height);
-    for (int x = 0; x < map.width; ++x) {
-      const Vec3d d = latlong_direction((x + 0.5) / map.width, (y + 0.5) / map.height);
-      const double share = double(sampler.pdf(to_float(d))) * omega;
-      total += share;
-      const auto found = seen.find({x, y});
-      const double count = found == seen.end() ? 0 : found->second;
-      const double expected = share * kDraws;
-      if (expected < 8) {
-        rest_seen += count;
-        rest_expected += expected;
-      } else {
-        statistic += (count - expected) * (count - expected) / expected;
-        ++degrees;
-      }
+    const double density = shares[texel] / total / omega;
+    const bool right = std::abs(double(sample.pdf) / density - 1) < 1e-5 &&
+                       sampler.pdf(sample.direction) == sample.pdf;
+    wrong += right ? 0 : 1;
+  }
+  EXPECT_EQ(wrong, 0);
+  double statistic = 0, rest_seen = 0, rest_expected = 0;
+  int degrees = -1;
+  for (size_t i = 0; i < counts.size(); ++i) {
+    const double expected = shares[i] / total * kDraws;
+    if (expected < 8) {
+      rest_seen += counts[i];
+      rest_expected += expected;
+    } else {
+      statistic += (counts[i] - expected) * (counts[i] - expected) / expected;
+      ++degrees;
     }
   }
-  EXPECT_NEAR(total, 1, 1e-6);
   if (rest_expected > 8) {
     statistic += (rest_seen - rest_expected) * (rest_seen - rest_expected) / rest_expected;
     ++degrees;
@@ -168,12 +171,21 @@ TEST(Sampler, DrawsFromItsDensityOnOddMaps) {
   EXPECT_GT(texel_chi_square(environment_of(gaps)), 1e-4);
 }
 
-TEST(Sampler, DrawsFromItsDensityOnRealMaps) {
+// Every lat-long map of the data set, with the whole density and with what a companion leaves.
+TEST(Sampler, DrawsFromItsDensityOnEveryRealMap) {
   LIGHTKILN_NEEDS_DATA(data);
-  for (const char* name : {"latlong_hdr/kloppenheim_05_1k.hdr", "latlong_exr/blender_night.exr"}) {
-    const auto file = test::read_file(data / "environments" / name);
-    EXPECT_GT(texel_chi_square(make_environment(decode_hdr_image(file))), 1e-4) << name;
+  int maps = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(data / "environments")) {
+    if (!entry.is_regular_file()) continue;
+    const DecodedImage decoded = decode_hdr_image(test::read_file(entry.path()));
+    if (decoded.image.width != 2 * decoded.image.height) continue;  // cubes and balls
+    const Environment environment = make_environment(decoded);
+    EXPECT_GT(texel_chi_square(environment), 1e-4) << entry.path();
+    EXPECT_GT(texel_chi_square(environment, mis_compensation_floor(environment)), 1e-4)
+        << entry.path();
+    ++maps;
   }
+  EXPECT_EQ(maps, 15);
 }
 
 TEST(Sampler, StaysInsideOneHotTexel) {
@@ -230,21 +242,49 @@ TEST(Sampler, GivesAConstantMapTheUniformDensity) {
   EXPECT_GT(chi_square(sampler), 1e-4);
 }
 
-// A float running sum loses every texel of 0.01 behind a sun of 1e6; ours keeps them all.
+// The first texel outshines each of two million others by 5e7, yet they hold 2.6 % of the light.
+Image sun_before_many(int height) {
+  Image map = map_of(height, 0.01f);
+  const double ratio = latlong_texel_solid_angle(height / 2, 2 * height, height) /
+                       latlong_texel_solid_angle(0, 2 * height, height);
+  std::fill_n(map.at(0, 0), 3, static_cast<float>(0.01 * 5e7 * ratio));
+  return map;
+}
+
 TEST(Sampler, KeepsDimTexelsBehindASun) {
-  Image map = map_of(64, 0.01f);
-  std::fill_n(map.at(0, 0), 3, 1e6f);
-  const Environment environment = environment_of(map);
+  const Environment environment = environment_of(sun_before_many(1024));
   const EnvironmentSampler sampler(environment);
-  for (int y = 0; y < 64; ++y) {
-    for (int x = 0; x < 128; ++x) {
-      const Vec3d d = latlong_direction((x + 0.5) / 128, (y + 0.5) / 64);
+  for (int y = 0; y < 1024; y += 31) {
+    for (int x = 0; x < 2048; ++x) {
+      const Vec3d d = latlong_direction((x + 0.5) / 2048, (y + 0.5) / 1024);
       ASSERT_GT(sampler.pdf(to_float(d)), 0);
     }
   }
-  float in_float = 1e6f;
-  for (int i = 0; i < 1000; ++i) in_float += 0.01f;
-  EXPECT_EQ(in_float, 1e6f);
+  EXPECT_GT(texel_chi_square(environment), 1e-4);
+}
+
+// The control: with running sums in float those texels are lost, and the draws show it.
+TEST(Sampler, WouldLoseThemToAFloatSum) {
+  const Environment environment = environment_of(sun_before_many(1024));
+  const Image& map = environment.radiance;
+  float running = 0;
+  size_t lost = 0;
+  double dim = 0, all = 0;
+  for (int y = 0; y < map.height; ++y) {
+    const double omega = latlong_texel_solid_angle(y, map.width, map.height);
+    for (int x = 0; x < map.width; ++x) {
+      const double weight = luminance(to_double(map.rgb(x, y))) * omega;
+      const float next = running + static_cast<float>(weight);
+      lost += next == running ? 1 : 0;
+      running = next;
+      all += weight;
+      dim += x + y > 0 ? weight : 0;
+    }
+  }
+  EXPECT_EQ(lost, map.pixels.size() / 3 - 1);
+  const double expected = dim / all * 60000;  // of as many draws as the test above makes
+  EXPECT_GT(expected, 1000);
+  EXPECT_LT(chi_square_p(expected * expected / expected, 1), 1e-4);
 }
 
 // Light / density has no variance where the map has one colour: a white furnace stays exact.
@@ -260,6 +300,93 @@ TEST(Sampler, IntegratesTheMapItself) {
   }
   EXPECT_NEAR(sum / kCount / (4 * kPi), luminance(environment.mean),
               1e-6 * luminance(environment.mean));
+}
+
+// Irradiance of a facing floor by one cosine-weighted and one light sample under the balance
+// heuristic, `count` times.
+struct Estimate {
+  double mean = 0, variance = 0;
+};
+Estimate irradiance_by_mis(const Environment& environment, const EnvironmentSampler& sampler,
+                           const Vec3d& normal) {
+  constexpr uint32_t kCount = 1 << 13;
+  const Basis<double> basis = make_basis(normal);
+  RunningMoments moments;
+  const auto weighed = [&](const Vec3d& d) {
+    const double cosine = dot(d, normal);
+    if (!(cosine > 0)) return 0.0;
+    const Vec3 direction = to_float(d);
+    const double light = luminance(to_double(environment_radiance(environment, direction)));
+    return light * cosine / (cosine / kPi + double(sampler.pdf(direction)));
+  };
+  for (uint32_t i = 0; i < kCount; ++i) {
+    const auto u = [i](uint32_t k) {
+      return to_unit_float(static_cast<uint32_t>(hash64(hash_combine(k, i))));
+    };
+    const double r = std::sqrt(double(u(0))), phi = 2 * kPi * double(u(1));
+    const Vec3d cosine_sample =
+        basis.to_world({r * std::cos(phi), r * std::sin(phi), std::sqrt(std::max(0.0, 1 - r * r))});
+    moments.add(weighed(cosine_sample) + weighed(to_double(sampler.sample(u(2), u(3)).direction)));
+  }
+  return {moments.mean, moments.variance() / kCount};
+}
+
+TEST(MisCompensation, IsUnbiasedAndLessNoisy) {
+  LIGHTKILN_NEEDS_DATA(data);
+  for (const char* name : {"kloppenheim_05_1k.hdr", "spiaggia_di_mondello_1k.hdr",
+                           "vestibule_1k.hdr", "studio_small_05_1k.hdr"}) {
+    const Environment environment = make_environment(
+        decode_hdr_image(test::read_file(data / "environments/latlong_hdr" / name)));
+    const double floor = mis_compensation_floor(environment);
+    EXPECT_GE(floor, 0.5 * luminance(environment.mean) * (1 - 1e-9));
+    EXPECT_LE(floor, luminance(environment.mean));
+    const EnvironmentSampler plain(environment), compensated(environment, floor);
+    Progress progress;
+    const LightCells light = gather_light(environment, 1, progress);
+    double before = 0, after = 0;
+    for (const Vec3d& n : {Vec3d{0, 1, 0}, Vec3d{1, 0, 0}, Vec3d{0, 0.6, -0.8}, Vec3d{-0.6, 0.8, 0},
+                           Vec3d{0, -0.8, 0.6}, Vec3d{0, 0, 1}}) {
+      const double truth = luminance(cell_irradiance(light, n));
+      const Estimate a = irradiance_by_mis(environment, plain, n);
+      const Estimate b = irradiance_by_mis(environment, compensated, n);
+      EXPECT_NEAR(a.mean, truth, 5 * std::sqrt(a.variance)) << name;
+      EXPECT_NEAR(b.mean, truth, 5 * std::sqrt(b.variance)) << name;
+      before += a.variance / (truth * truth);
+      after += b.variance / (truth * truth);
+    }
+    EXPECT_LT(after, before) << name;
+  }
+}
+
+// By itself the compensated sampler never looks at dim texels: its estimate alone is short of them.
+TEST(MisCompensation, WouldBeBiasedAlone) {
+  const Environment environment = environment_of(reference::test_sky(24, 1e4));
+  const EnvironmentSampler sampler(environment, mis_compensation_floor(environment));
+  double sum = 0;
+  constexpr uint32_t kCount = 4096;
+  for (uint32_t i = 0; i < kCount; ++i) {
+    const Point2 p = sobol2(11, i);
+    const auto sample = sampler.sample(p.x, p.y);
+    sum += luminance(to_double(sample.radiance)) / double(sample.pdf);
+  }
+  EXPECT_LT(sum / kCount / (4 * kPi), 0.99 * luminance(environment.mean));
+}
+
+TEST(MisCompensation, SolvesItsEquation) {
+  const Environment environment = environment_of(reference::test_sky(24, 1e3));
+  const double floor = mis_compensation_floor(environment);
+  double over = 0;
+  for (int y = 0; y < 24; ++y) {
+    for (int x = 0; x < 48; ++x) {
+      const double l = luminance(to_double(environment.radiance.rgb(x, y)));
+      over += std::max(0.0, l - floor) * latlong_texel_solid_angle(y, 48, 24) / (4 * kPi);
+    }
+  }
+  EXPECT_NEAR(over, floor, 1e-10 * floor);
+  EXPECT_EQ(mis_compensation_floor(environment_of(map_of(8, 0))), 0);
+  const Environment grey = constant_environment({2, 2, 2});
+  EXPECT_NEAR(mis_compensation_floor(grey), 1, 1e-12);
+  EXPECT_NEAR(EnvironmentSampler(grey, 1.0).pdf({0, 1, 0}), 1 / (4 * kPi), 1e-8);
 }
 
 }  // namespace
