@@ -18,6 +18,7 @@ struct EnvironmentMapsState {
   Grants grants;
   std::string format;
   EnvmapAttribute envmap = EnvmapAttribute::none;
+  std::vector<std::string> warnings;  // of the input
   MapsLight light;
   MapsOutputs outputs;
 
@@ -57,13 +58,14 @@ int bands_of(const MapsOutputs& outputs) {
 
 std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_maps_open(
     const Spec& spec, const Inputs& inputs, const Grants& grants) {
-  const DecodedImage decoded = decode_hdr_image(blob_bytes(spec.environment.value(), inputs));
+  DecodedImage decoded = decode_light_image(blob_bytes(spec.environment.value(), inputs));
   std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> state(
       new EnvironmentMapsState{spec,
                                grants,
                                decoded.format,
                                decoded.envmap,
-                               {make_environment(decoded), grants.threads},
+                               light_warnings(decoded),
+                               {make_environment(std::move(decoded)), grants.threads},
                                {}});
   state->outputs =
       order_outputs(state->parameters(), state->light, working_target(state->target()));
@@ -186,6 +188,7 @@ Plan environment_maps_plan(EnvironmentMapsState& state, Progress& progress) {
   if (repairs.nan > 0) plan.repairs.emplace_back("nan_pixels", repairs.nan);
   if (repairs.infinite > 0) plan.repairs.emplace_back("infinite_pixels", repairs.infinite);
   if (repairs.negative > 0) plan.repairs.emplace_back("negative_pixels", repairs.negative);
+  plan.warnings = state.warnings;
   if (!(luminance(environment.mean) > 0)) {
     plan.warnings.push_back("The environment is black: every light output is 0.");
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/image/decode.h"
@@ -12,7 +13,7 @@ namespace lightkiln {
 
 namespace {
 
-Image to_rgb(const Image& source) {
+Image to_rgb(Image source) {
   if (source.channels == 3) return source;
   Image rgb(source.width, source.height, 3);
   for (int y = 0; y < source.height; ++y) {
@@ -88,10 +89,10 @@ void summarise(Environment* environment) {
 
 }  // namespace
 
-Environment make_environment(const DecodedImage& decoded) {
+Environment make_environment(DecodedImage decoded) {
   check_shape(decoded);
   Environment environment;
-  environment.radiance = to_rgb(decoded.image);
+  environment.radiance = to_rgb(std::move(decoded.image));
   environment.repairs = sanitise(environment.radiance);
   if (decoded.envmap == EnvmapAttribute::latlong) {
     environment.radiance = from_border_texels(environment.radiance);

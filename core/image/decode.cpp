@@ -110,6 +110,27 @@ void frame_as_displayed(DecodedImage& decoded) {
   decoded.display.reset();
 }
 
+std::vector<std::string> light_warnings(const DecodedImage& decoded) {
+  std::vector<std::string> warnings;
+  if (decoded.display_referred) {
+    warnings.push_back("The environment (" + decoded.format +
+                       ") was made for a screen: nothing in it is brighter than 1, so lamps and "
+                       "the sun are missing from the light. An OpenEXR or Radiance HDR map holds "
+                       "them.");
+  }
+  if (decoded.pixels_missing > 0) {
+    warnings.push_back(std::to_string(decoded.pixels_missing) +
+                       " pixels of the environment's display window are not in the file and count "
+                       "as black.");
+  }
+  if (decoded.pixels_outside > 0) {
+    warnings.push_back(std::to_string(decoded.pixels_outside) +
+                       " pixels of the environment lie outside its display window and were "
+                       "dropped.");
+  }
+  return warnings;
+}
+
 PixelRepairs sanitise(Image& image) {
   PixelRepairs repairs;
   for (float& value : image.pixels) {

@@ -4,6 +4,8 @@
 
 #include <cstddef>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "core/image/exr.h"
 
@@ -23,6 +25,10 @@ DecodedImage decode_light_image(std::span<const std::byte> bytes);
 //   counted in `decoded`.
 // Throws Error: invalid_input when the two do not meet, too_large as read_exr.
 void frame_as_displayed(DecodedImage& decoded);
+
+// What a plan warns of: a picture made for a screen, which holds no light brighter than white, and
+// pixels that were missing or dropped.
+std::vector<std::string> light_warnings(const DecodedImage& decoded);
 
 // Sets NaN, infinite and negative values to 0 and counts them by kind.
 PixelRepairs sanitise(Image& image);
