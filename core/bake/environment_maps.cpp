@@ -34,20 +34,6 @@ void EnvironmentMapsStateDeleter::operator()(EnvironmentMapsState* state) const 
 
 namespace {
 
-std::vector<LobePlan> lobes_of(const MapsOutputs& outputs) {
-  std::vector<LobePlan> lobes;
-  for (const auto& output : outputs) {
-    if (const LobePlan* lobe = output->spectrum_need().lobe) lobes.push_back(*lobe);
-  }
-  return lobes;
-}
-
-int sh_bands_of(const MapsOutputs& outputs) {
-  int bands = 0;
-  for (const auto& output : outputs) bands = std::max(bands, output->spectrum_need().sh_bands);
-  return bands;
-}
-
 int bands_of(const MapsOutputs& outputs) {
   int bands = sh_bands_of(outputs);
   for (const LobePlan& lobe : lobes_of(outputs)) bands = std::max(bands, lobe.bands);
@@ -69,7 +55,7 @@ std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_m
                                {}});
   state->outputs =
       order_outputs(state->parameters(), state->light, working_target(state->target()));
-  state->light.require(sh_bands_of(state->outputs), lobes_of(state->outputs));
+  require_spectrum(state->outputs, &state->light);
   return state;
 }
 

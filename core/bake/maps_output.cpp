@@ -22,6 +22,24 @@ MapsOutputs order_outputs(const EnvironmentMapsParameters& parameters, MapsLight
   return outputs;
 }
 
+std::vector<LobePlan> lobes_of(const MapsOutputs& outputs) {
+  std::vector<LobePlan> lobes;
+  for (const auto& output : outputs) {
+    if (const LobePlan* lobe = output->spectrum_need().lobe) lobes.push_back(*lobe);
+  }
+  return lobes;
+}
+
+int sh_bands_of(const MapsOutputs& outputs) {
+  int bands = 0;
+  for (const auto& output : outputs) bands = std::max(bands, output->spectrum_need().sh_bands);
+  return bands;
+}
+
+void require_spectrum(const MapsOutputs& outputs, MapsLight* light) {
+  light->require(sh_bands_of(outputs), lobes_of(outputs));
+}
+
 double working_target(double target_error) {
   return 0.1 * target_error;
 }

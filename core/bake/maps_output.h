@@ -56,6 +56,11 @@ std::span<const MapsProduct> maps_products();
 MapsOutputs order_outputs(const EnvironmentMapsParameters& parameters, MapsLight& light,
                           double target);
 
+// What the outputs need of the map's coefficients together.
+std::vector<LobePlan> lobes_of(const MapsOutputs& outputs);
+int sh_bands_of(const MapsOutputs& outputs);
+void require_spectrum(const MapsOutputs& outputs, MapsLight* light);
+
 // The bound that an order of `target_error` is baked to. A bound is an rms over the sphere; a tenth
 // of the order leaves room for the single texel.
 double working_target(double target_error);
