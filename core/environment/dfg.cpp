@@ -1,6 +1,8 @@
 // Sources: Karis, "Real Shading in Unreal Engine 4", SIGGRAPH 2013 course (split sum); Heitz,
 // "Understanding the Masking-Shadowing Function", JCGT 3(2), 2014 (height-correlated Smith), and
-// "Sampling the GGX Distribution of Visible Normals", JCGT 7(4), 2018 (the stretched hemisphere).
+// "Sampling the GGX Distribution of Visible Normals", JCGT 7(4), 2018 (the stretched hemisphere);
+// Turquin, "Practical multiple scattering compensation for microfacet models", 2019 (compensation
+// by 1 / E); Filament, libs/ibl/src/CubemapIBL.cpp, DFV_Multiscatter (the layout that serves it).
 
 #include "core/environment/dfg.h"
 
@@ -9,6 +11,7 @@
 #include <vector>
 
 #include "core/base/parallel.h"
+#include "core/environment/charlie_albedo.h"
 #include "core/sphere/quadrature.h"
 
 namespace lightkiln {
@@ -98,20 +101,33 @@ DfgValue ggx_dfg(double alpha, double cosine, int refinement) {
   return integrate(alpha, cosine, make_rule(refinement * kAzimuths, refinement * kRadii));
 }
 
-Image ggx_dfg_table(int size, int threads, Progress& progress) {
+double compensated_reflectance(const DfgValue& value, double f0) {
+  const double white = value.scale + value.bias;
+  return (f0 * value.scale + value.bias) * (1 + f0 * (1 / white - 1));
+}
+
+Image dfg_table(int size, const DfgTableOptions& options, int threads, Progress& progress) {
   Image table(size, size, 3);
   parallel_blocks(static_cast<size_t>(size), 4, threads, progress, [&](size_t begin, size_t end) {
     for (size_t row = begin; row < end; ++row) {
       const double roughness = (static_cast<double>(row) + 0.5) / size;
+      const double alpha = roughness * roughness;
       for (int x = 0; x < size; ++x) {
-        const DfgValue value = ggx_dfg(roughness * roughness, (x + 0.5) / size);
+        const double cosine = (x + 0.5) / size;
+        const DfgValue value = ggx_dfg(alpha, cosine);
+        const double white = value.scale + value.bias;
         float* out = table.at(x, static_cast<int>(row));
-        out[0] = static_cast<float>(value.scale);
-        out[1] = static_cast<float>(value.bias);
+        out[0] = static_cast<float>(options.multiple_scattering ? value.bias : value.scale);
+        out[1] = static_cast<float>(options.multiple_scattering ? white : value.bias);
+        if (options.charlie) out[2] = static_cast<float>(charlie_albedo(alpha, cosine));
       }
     }
   });
   return table;
+}
+
+Image ggx_dfg_table(int size, int threads, Progress& progress) {
+  return dfg_table(size, {}, threads, progress);
 }
 
 }  // namespace lightkiln

@@ -21,8 +21,22 @@ DfgValue ggx_dfg(double alpha, double cosine, int refinement = 1);
 // refinement 8.
 inline constexpr double kDfgErrorBound = 1e-5;
 
-// size x size, three channels: R = scale, G = bias, B = 0. Column x holds n.v = (x + 1/2) / size,
-// row y (from the top) roughness = (y + 1/2) / size.
+// What an infinitely deep play of reflections between microfacets would give back, as engines
+// estimate it: reflected = (F0 scale + bias) (1 + F0 (1 / E - 1)), E = scale + bias, which is 1 for
+// F0 = 1.
+double compensated_reflectance(const DfgValue& value, double f0);
+
+// What a table's channels hold.
+struct DfgTableOptions {
+  // false: R = scale, G = bias, as glTF viewers read: F0 R + G.
+  // true: R = bias, G = E = scale + bias, as Filament reads for energy compensation:
+  // mix(R, G, F0) (1 + F0 (1 / G - 1)).
+  bool multiple_scattering = false;
+  bool charlie = false;  // B = charlie_albedo(), else 0
+};
+// size x size, three channels. Column x holds n.v = (x + 1/2) / size, row y (from the top)
+// roughness = (y + 1/2) / size.
+Image dfg_table(int size, const DfgTableOptions& options, int threads, Progress& progress);
 Image ggx_dfg_table(int size, int threads, Progress& progress);
 
 }  // namespace lightkiln

@@ -8,7 +8,6 @@
 #include <cmath>
 
 #include "core/base/math.h"
-#include "core/sphere/quadrature.h"
 
 namespace lightkiln {
 
@@ -47,37 +46,38 @@ double GgxLobe::at_angle(double angle_rad) const {
   return scale_ * std::cos(angle_rad) / (d * d);
 }
 
-// h_l = 2 pi integral_0^{pi/2} lobe(t) P_l(cos t) sin t dt by panels of 16 Gauss points: no wider
-// than half the distance to the lobe's nearest complex pole (about max(alpha, t)), nor than 24
-// radians of the fastest band.
-std::vector<double> ggx_band_responses(const GgxLobe& lobe, int bands) {
-  const GaussRule rule = gauss_legendre(16);
-  std::vector<double> responses(static_cast<size_t>(bands));
-  std::vector<double> grow, keep;
-  for (int l = 0; l < bands; ++l) {
-    grow.push_back(l > 0 ? (2.0 * l - 1) / l : 0.0);
-    keep.push_back(l > 0 ? (l - 1.0) / l : 0.0);
-  }
-  for (double begin = 0; begin < kPi / 2;) {
-    const double widest = std::min(0.5 * std::max(lobe.alpha(), begin), 24.0 / bands);
-    const double end = std::min(kPi / 2, begin + widest);
-    for (size_t i = 0; i < rule.nodes.size(); ++i) {
-      const double angle = begin + (end - begin) * 0.5 * (1 + rule.nodes[i]);
-      const double weight =
-          2 * kPi * lobe.at_angle(angle) * std::sin(angle) * 0.5 * (end - begin) * rule.weights[i];
-      const double z = std::cos(angle);
-      double before = 0, value = weight;
-      responses[0] += value;
-      for (size_t l = 1; l < responses.size(); ++l) {
-        const double next = grow[l] * z * value - keep[l] * before;
-        before = value;
-        value = next;
-        responses[l] += value;
-      }
+// No wider than half the distance to the lobe's nearest complex pole, about max(alpha, t).
+double GgxLobe::panel(double angle_rad) const {
+  return 0.5 * std::max(alpha_, angle_rad);
+}
+
+// 1 / d^2 = integral_0^inf s exp(-s d) ds is a sum of Gaussians in the chord, as d = a + q x. Those
+// with s < split are wide, and what remains sums to the core:
+//   integral_split^inf s exp(-s d) ds = exp(-split d) (1 + split d) / d^2  (Ewald's device).
+// 1 - (1 + z) exp(-z) = z^2/2 - z^3/3 + z^4/8 - ... cancels for small z and is summed there.
+double GgxHalo::at_angle(double angle_rad) const {
+  const double s = std::sin(angle_rad / 2);
+  const double z = split_ * (lobe_.narrow() + lobe_.broad() * 2 * s * s);
+  double share = 0;
+  if (z < 0.1) {
+    double term = z * z;  // the series' k-th term is (-1)^k (k - 1) / k! z^k
+    for (int k = 2; k < 12; ++k) {
+      share += term * (k - 1);
+      term *= -z / (k + 1);
     }
-    begin = end;
+    share *= 0.5;
+  } else {
+    share = 1 - (1 + z) * std::exp(-z);
   }
-  return responses;
+  return share * lobe_.at_angle(angle_rad);
+}
+
+double GgxHalo::panel(double angle_rad) const {
+  return std::max(0.5 * std::max(lobe_.alpha(), angle_rad), 1 / std::sqrt(split_));
+}
+
+std::vector<double> ggx_band_responses(const GgxLobe& lobe, int bands) {
+  return band_responses(lobe, bands);
 }
 
 }  // namespace lightkiln

@@ -1,57 +1,48 @@
 #pragma once
 
-// Convolution of an environment with GGX lobes and the clamped cosine, in the domain of spherical
-// harmonics: no samples, no noise, and an error bound before the work starts.
+// Convolution of an environment with GGX and Charlie lobes and the clamped cosine, in the domain of
+// spherical harmonics: no samples, no noise, and an error bound before the work starts. The core of
+// a lobe too narrow for any affordable band limit is integrated over the map's texels instead.
 //
 //   LightStatistics light = measure_light(environment);
-//   LobePlan lobe = plan_lobe(light, alpha, target);         // bands and bound
+//   LobePlan lobe = plan_lobe(light, {LobeKind::ggx, alpha}, target);   // bands and bound
 //   LatlongSpectrum spectrum = project_for(environment, lobes, ...);
-//   Image cube = convolve_lobe(light, spectrum, lobe, size, ...);
+//   Image cube = convolve_lobe(environment, light, spectrum, lobe, size, ...);
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "core/environment/environment.h"
-#include "core/environment/ggx_lobe.h"
+#include "core/environment/light_statistics.h"
+#include "core/environment/lobe.h"
 #include "core/sphere/harmonic_transform.h"
 
 namespace lightkiln {
 
-// A texel so bright that what a band limit cuts off it would be seen.
-struct BrightTexel {
-  Vec3d direction;
-  Vec3d energy;       // radiance times solid angle
-  double extent_rad;  // the longer side
-};
-
-struct LightStatistics {
-  Vec3 lowest, highest;  // per channel: no convolution leaves this range
-  Vec3d mean;
-  double mean_luminance = 0;
-  // Standard deviation over the sphere relative to mean_luminance (largest channel), with and
-  // without the bright texels; their share of all energy.
-  double spread = 0;
-  double rest_spread = 0;
-  double bright_share = 0;
-  std::vector<BrightTexel> bright;  // at most kMaxBrightTexels, brightest first
-};
-inline constexpr int kMaxBrightTexels = 96;
-LightStatistics measure_light(const Environment& environment);
-
 // How one lobe is convolved.
 struct LobePlan {
-  double alpha = 0;
+  Lobe lobe;
   int bands = 0;                  // of the map that enter
   bool corrected = false;         // bright texels get what the band limit cuts off, in closed form
-  std::vector<double> responses;  // h_l for l < bands
+  double split = 0;               // above 0: the core is left to the map's texels (see GgxHalo)
+  double tolerance = 0;           // of the core, relative; 0 without a core
+  std::vector<double> responses;  // h_l for l < bands, of the lobe or of its halo
   double error_bound = 0;         // rms over the sphere, relative to the mean
   double uncorrected_bound = 0;   // what it would be without the correction
 };
 // The fewest bands whose bound stays at or under `target` (relative rms). Where no allowed number
 // does, the most are taken, and error_bound, then above `target`, says what that gives.
 inline constexpr int kMaxBands = 1400;
+// GGX lobes that would need more bands than these are split.
+inline constexpr int kSplitBands = 800;
+LobePlan plan_lobe(const LightStatistics& light, const Lobe& lobe, double target);
+// GGX by bands alone, however narrow.
 LobePlan plan_lobe(const LightStatistics& light, double alpha, double target);
+
+// The grid that a level is read from: interpolating it is part of the bound.
+int convolution_rings(int bands);
+int convolution_longitudes(int bands);
 
 // The map's coefficients for all `lobes` and for `sh_bands` bands at full accuracy.
 LatlongSpectrum project_for(const Environment& environment, std::span<const LobePlan> lobes,
@@ -63,6 +54,11 @@ struct RangeReport {
   double most = 0;  // relative to the mean luminance
 };
 // The lobe's average of the map about the centre of every texel of a cube.
+Image convolve_lobe(const Environment& environment, const LightStatistics& light,
+                    const LatlongSpectrum& spectrum, const LobePlan& lobe, int face_size,
+                    int threads, Progress& progress, RangeReport* range = nullptr);
+
+// The same for a lobe that is not split.
 Image convolve_lobe(const LightStatistics& light, const LatlongSpectrum& spectrum,
                     const LobePlan& lobe, int face_size, int threads, Progress& progress,
                     RangeReport* range = nullptr);

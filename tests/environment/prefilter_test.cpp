@@ -113,7 +113,7 @@ Difference against_brute_force(const Environment& environment, const Level& leve
     const int texel = (i * 7919 + 13) % (6 * size * size);
     const int x = texel % size, y = texel / size;
     const Vec3d d = cube_texel_direction(y / size, x, y % size, size);
-    const Vec3d truth = reference::prefilter(environment.radiance, level.lobe.alpha, d);
+    const Vec3d truth = reference::prefilter(environment.radiance, level.lobe.lobe.alpha, d);
     const Vec3d error = to_double(level.cube.rgb(x, y)) - truth;
     difference.rms += dot(error, error) / 3;
     for (int c = 0; c < 3; ++c) {

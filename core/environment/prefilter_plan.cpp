@@ -1,0 +1,152 @@
+// Choosing band limits from bounds.
+//
+// Sources: Ramamoorthi & Hanrahan, "A Signal-Processing Framework for Inverse Rendering", SIGGRAPH
+// 2001 (reflection as convolution); Driscoll & Healy 1994 (zonal convolution multiplies bands).
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/environment/bright_light.h"
+#include "core/environment/ggx_lobe.h"
+#include "core/environment/near_field.h"
+#include "core/environment/prefilter.h"
+
+namespace lightkiln {
+
+namespace {
+
+// Responses that matter lie below about 12 / alpha, from where only the horizon's kink is left,
+// which falls as l^-2.5.
+int response_count(double alpha) {
+  return std::clamp(static_cast<int>(20 / alpha), 512, kMaxBands) + 1;
+}
+
+// max_{l >= L} |h_l| for every L.
+std::vector<double> response_tails(const std::vector<double>& responses) {
+  std::vector<double> tails = responses;
+  // Beyond the kink's reach odd bands vanish: the last one says nothing of what follows it.
+  double largest = std::abs(responses[responses.size() - 2]);
+  for (size_t l = tails.size(); l-- > 0;) {
+    largest = std::max(largest, std::abs(responses[l]));
+    tails[l] = largest;
+  }
+  return tails;
+}
+
+int first_under(const std::vector<double>& tails, double limit) {
+  for (size_t l = 1; l < tails.size(); ++l) {
+    if (tails[l] <= limit) return static_cast<int>(l);
+  }
+  return -1;
+}
+
+struct BandChoice {
+  int bands = 0;
+  bool corrected = false;
+};
+
+// Cutting at L removes bands of the map whose squared norm is at most the map's variance, each
+// times |h_l|: rms error <= max_{l>=L} |h_l| spread (Parseval). With the bright texels corrected in
+// closed form, only the rest of the map is cut. A part of the target is granted to this cut; a
+// smaller one without correction, since the error then gathers where the sun stands.
+BandChoice choose_bands(const LightStatistics& light, const std::vector<double>& tails,
+                        double target) {
+  const int all = first_under(tails, 0.1 * target / light.spread);
+  const int rest = first_under(tails, 0.5 * target / light.rest_spread);
+  // Correction costs a term per texel and bright texel; a few more bands are cheaper.
+  if (all > 0 && (light.bright.empty() || all <= rest + rest / 2 + 48)) {
+    return {all, false};
+  }
+  if (rest > 0) return {rest, !light.bright.empty()};
+  return {static_cast<int>(tails.size()) - 1, !light.bright.empty()};
+}
+
+// Interpolating the grid: band l errs by at most e_l h_l of its part of the map.
+double interpolation_bound(const LightStatistics& light, const std::vector<double>& responses,
+                           int bands) {
+  const int rings = convolution_rings(bands), longitudes = convolution_longitudes(bands);
+  double largest = 0;
+  for (int l = 1; l < bands; ++l) {
+    const double error = RingGrid::interpolation_error(l, rings, longitudes);
+    largest = std::max(largest, error * std::abs(responses[static_cast<size_t>(l)]));
+  }
+  return largest * light.spread;
+}
+
+// A lobe's core is left to the map's texels where its bands would be more than these: as many as
+// balance a transform's cubes of bands against the texels that a core then covers.
+int halo_bands(const LightStatistics& light) {
+  return std::clamp(static_cast<int>(36 * std::sqrt(light.map_height)), 384, kMaxBands);
+}
+
+// The halo's bands fall like exp(-l^2 / split): the largest split whose bands beyond the limit stay
+// under half the target. The core's relative error times the norm of the level, at most 1 + spread,
+// takes what is left.
+LobePlan plan_split(const LightStatistics& light, const Lobe& lobe, double target) {
+  constexpr double kSmallestTolerance = 1e-9;
+  LobePlan plan;
+  plan.lobe = lobe;
+  plan.bands = halo_bands(light);
+  const double reserve = std::max(1.0, std::log(2 * light.spread / target));
+  plan.split = double(plan.bands) * plan.bands / reserve;
+  const std::vector<double> responses =
+      band_responses(GgxHalo(lobe.alpha, plan.split), plan.bands + 64);
+  plan.responses.assign(responses.begin(), responses.begin() + plan.bands);
+  const double cut = response_tails(responses)[static_cast<size_t>(plan.bands)] * light.spread;
+  const double norm = NearField::kNormFactor * (1 + light.spread);
+  plan.tolerance = std::clamp(0.4 * target / norm, kSmallestTolerance, NearField::kWorstTolerance);
+  plan.error_bound =
+      cut + interpolation_bound(light, responses, plan.bands) + norm * plan.tolerance;
+  plan.uncorrected_bound = plan.error_bound;
+  return plan;
+}
+
+}  // namespace
+
+int convolution_rings(int bands) {
+  constexpr double kRingsPerBand = 2.5;
+  return std::max(16, 2 * static_cast<int>(std::ceil(kRingsPerBand * bands / 2)));
+}
+int convolution_longitudes(int bands) {
+  constexpr double kLongitudesPerBand = 5;
+  int result = 16;
+  while (result < kLongitudesPerBand * bands) result *= 2;
+  return result;
+}
+
+static LobePlan plan_banded(const LightStatistics& light, const Lobe& lobe, double target) {
+  const std::unique_ptr<ZonalKernel> kernel = make_kernel(lobe);
+  const std::vector<double> responses = band_responses(*kernel, response_count(lobe.alpha));
+  const std::vector<double> tails = response_tails(responses);
+  BandChoice choice = choose_bands(light, tails, target);
+  const auto total_bound = [&](bool corrected) {
+    const double cut =
+        tails[static_cast<size_t>(choice.bands)] * (corrected ? light.rest_spread : light.spread);
+    return cut + interpolation_bound(light, responses, choice.bands) +
+           (corrected ? cut_light_bound(light, responses, choice.bands) : 0.0);
+  };
+  const int most = static_cast<int>(responses.size()) - 1;
+  while (total_bound(choice.corrected) > target && choice.bands < most) {
+    choice.bands = std::min(most, choice.bands + choice.bands / 8 + 1);
+  }
+  LobePlan plan;
+  plan.lobe = lobe;
+  plan.bands = choice.bands;
+  plan.corrected = choice.corrected;
+  plan.responses.assign(responses.begin(), responses.begin() + choice.bands);
+  plan.error_bound = total_bound(choice.corrected);
+  plan.uncorrected_bound = total_bound(false);
+  return plan;
+}
+
+LobePlan plan_lobe(const LightStatistics& light, const Lobe& lobe, double target) {
+  const LobePlan plan = plan_banded(light, lobe, target);
+  if (lobe.kind == LobeKind::charlie || plan.bands <= kSplitBands) return plan;
+  return plan_split(light, lobe, target);
+}
+
+LobePlan plan_lobe(const LightStatistics& light, double alpha, double target) {
+  return plan_banded(light, {LobeKind::ggx, alpha}, target);
+}
+
+}  // namespace lightkiln
