@@ -11,6 +11,7 @@ inline constexpr double kLegendrePerTerm = 3.5e-10;
 inline constexpr double kRingPerTerm = 7e-9;  // bands^3
 inline constexpr double kPerTexel = 4e-8;     // interpolation
 inline constexpr double kPerBrightTexel = 7e-9;
+inline constexpr double kPerCorePoint = 4e-9;
 inline constexpr double kResamplePerCell = 1.3e-8;
 inline constexpr double kPerDfgValue = 2.8e-6;
 inline constexpr double kBrutePerTexel = 5e-9;  // of the map, each texel that is checked

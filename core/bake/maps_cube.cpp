@@ -6,41 +6,48 @@
 #include "core/bake/maps_cost.h"
 #include "core/base/text.h"
 #include "core/environment/brute_force.h"
+#include "core/environment/charlie_lobe.h"
+#include "core/environment/ggx_lobe.h"
+#include "core/environment/near_field.h"
 #include "core/environment/resample.h"
 #include "core/sphere/direction_map.h"
 
 namespace lightkiln {
 
-ConvolvedCube::ConvolvedCube(MapsLight& light, int size, std::optional<double> alpha, double scale,
+ConvolvedCube::ConvolvedCube(MapsLight& light, int size, std::optional<Lobe> lobe, double scale,
                              double target)
-    : size_(size), alpha_(alpha), scale_(scale), constant_(light.constant()) {
-  if (alpha_ && !constant_) lobe_ = plan_lobe(light.statistics(), *alpha_, target);
+    : size_(size), lobe_(lobe), scale_(scale), constant_(light.constant()) {
+  if (lobe_ && !constant_) plan_ = plan_lobe(light.statistics(), *lobe_, target);
 }
 
 double ConvolvedCube::error_bound() const {
   if (constant_) return 0;
-  return alpha_ ? lobe_.error_bound : kResampleError;
+  return lobe_ ? plan_.error_bound : kResampleError;
 }
 
 SpectrumNeed ConvolvedCube::spectrum_need() const {
-  return {0, lobe_.bands > 0 ? &lobe_ : nullptr};
+  return {0, plan_.bands > 0 ? &plan_ : nullptr};
 }
 
 double ConvolvedCube::model_seconds(MapsLight& light) const {
   if (constant_) return 0;
   const Image& map = light.environment().radiance;
   const double texels = 6.0 * size_ * size_;
-  if (!alpha_) return kResamplePerCell * (map.width + 4.0 * size_) * (map.height + 2.0 * size_);
-  const double cut = lobe_.bands;
+  if (!lobe_) return kResamplePerCell * (map.width + 4.0 * size_) * (map.height + 2.0 * size_);
+  const double cut = plan_.bands;
   double seconds = kRingPerTerm * cut * cut * cut + kPerTexel * texels;
-  if (lobe_.corrected) {
+  if (plan_.corrected) {
     seconds += kPerBrightTexel * texels * static_cast<double>(light.statistics().bright.size());
+  }
+  if (plan_.split > 0) {
+    seconds += kPerCorePoint * texels *
+               NearField(map, lobe_->alpha, plan_.split, plan_.tolerance).typical_points();
   }
   return seconds;
 }
 
 Image ConvolvedCube::make_cube(MapsLight& light, Progress& progress) const {
-  if (!constant_ && !alpha_) {
+  if (!constant_ && !lobe_) {
     return resample_to_cube(light.environment().radiance, size_, light.threads(), progress);
   }
   Image cube(size_, 6 * size_, 3);
@@ -48,8 +55,8 @@ Image ConvolvedCube::make_cube(MapsLight& light, Progress& progress) const {
     const Vec3 radiance = to_float(light.environment().mean);
     for (size_t i = 0; i < cube.pixels.size(); i += 3) std::copy_n(&radiance.x, 3, &cube.pixels[i]);
   } else {
-    cube = convolve_lobe(light.statistics(), light.spectrum(progress), lobe_, size_,
-                         light.threads(), progress);
+    cube = convolve_lobe(light.environment(), light.statistics(), light.spectrum(progress), plan_,
+                         size_, light.threads(), progress);
   }
   if (scale_ != 1) {
     for (float& value : cube.pixels) value = static_cast<float>(scale_ * double(value));
@@ -57,20 +64,31 @@ Image ConvolvedCube::make_cube(MapsLight& light, Progress& progress) const {
   return cube;
 }
 
+namespace {
+
+// What a level ought to hold at a direction.
+Vec3d slow_average(const Environment& environment, const Lobe& lobe, const Vec3d& direction) {
+  if (lobe.kind == LobeKind::ggx)
+    return lobe_average(environment, GgxLobe(lobe.alpha), lobe.alpha, direction);
+  // A ring about the horizon: nowhere does it change faster than there.
+  return lobe_average(environment, CharlieLobe(lobe.alpha), 0, direction, 16 * lobe.alpha);
+}
+
+}  // namespace
+
 // Relative to the output's mean.
 MeasuredError ConvolvedCube::check(MapsLight& light, const Image& cube, int count,
                                    Progress& progress) const {
   ErrorMeter meter(scale_ * luminance(light.environment().mean));
-  const std::optional<GgxLobe> lobe = alpha_ ? std::optional<GgxLobe>(*alpha_) : std::nullopt;
   const size_t side = static_cast<size_t>(size_);
   for (int i = 0; i < count; ++i) {
     progress.check();
     const size_t index = check_index(i, 6 * side * side);
     const int x = static_cast<int>(index % side), y = static_cast<int>(index / side);
-    const Vec3d truth = lobe ? lobe_average(light.environment(), *lobe, *alpha_,
-                                            cube_texel_direction(y / size_, x, y % size_, size_)) *
-                                   scale_
-                             : texel_average(light.environment(), y / size_, x, y % size_, size_);
+    const Vec3d truth = lobe_ ? slow_average(light.environment(), *lobe_,
+                                             cube_texel_direction(y / size_, x, y % size_, size_)) *
+                                    scale_
+                              : texel_average(light.environment(), y / size_, x, y % size_, size_);
     meter.add(to_double(cube.rgb(x, y)), truth);
   }
   return meter.result();
@@ -94,7 +112,7 @@ namespace {
 class IrradianceCube : public ConvolvedCube {
  public:
   IrradianceCube(MapsLight& light, int size, double target)
-      : ConvolvedCube(light, size, 1.0, kPi, target) {}
+      : ConvolvedCube(light, size, Lobe{LobeKind::ggx, 1}, kPi, target) {}
 
   void file(ByteReader& reader, const MeasuredError& measured, Assembly* assembly,
             EnvironmentDocument* document) const override {
@@ -109,8 +127,9 @@ class PrefilteredLevel : public ConvolvedCube {
  public:
   PrefilteredLevel(MapsLight& light, int size, int index, double roughness, double target)
       : ConvolvedCube(light, size,
-                      roughness > 0 ? std::optional(roughness * roughness) : std::nullopt, 1,
-                      target),
+                      roughness > 0 ? std::optional(Lobe{LobeKind::ggx, roughness * roughness})
+                                    : std::nullopt,
+                      1, target),
         index_(index),
         roughness_(roughness) {}
 

@@ -11,10 +11,9 @@ namespace lightkiln {
 
 class ConvolvedCube : public MapsOutput {
  public:
-  // `alpha` none: the map itself, resampled by area. `scale` multiplies the average (pi:
+  // `lobe` none: the map itself, resampled by area. `scale` multiplies the average (pi:
   // irradiance).
-  ConvolvedCube(MapsLight& light, int size, std::optional<double> alpha, double scale,
-                double target);
+  ConvolvedCube(MapsLight& light, int size, std::optional<Lobe> lobe, double scale, double target);
 
   double error_bound() const override;
   SpectrumNeed spectrum_need() const override;
@@ -31,10 +30,10 @@ class ConvolvedCube : public MapsOutput {
   MeasuredError check(MapsLight& light, const Image& cube, int count, Progress& progress) const;
 
   int size_;
-  std::optional<double> alpha_;
+  std::optional<Lobe> lobe_;
   double scale_;
   bool constant_;
-  LobePlan lobe_;  // empty when nothing is convolved
+  LobePlan plan_;  // empty when nothing is convolved
 };
 
 }  // namespace lightkiln

@@ -19,7 +19,7 @@ class DfgTable : public MapsOutput {
 
   MeasuredError make(MapsLight& light, int check_texels, ByteWriter& writer,
                      Progress& progress) const override {
-    const Image table = ggx_dfg_table(size_, light.threads(), progress);
+    const Image table = dfg_table(size_, {}, light.threads(), progress);
     writer.floats(table.pixels);
     ErrorMeter meter(1);
     constexpr int kTwinRefinement = 8;

@@ -41,14 +41,16 @@ double integrate_lobe(const Lobe& lobe, const Vec3d& axis, double longitude_rad,
 // smaller than a fiftieth of the distance over which the lobe changes, its centre stands for it;
 // elsewhere, on the lobe's horizon and for bright texels the lobe is integrated. Lobe:
 // operator()(cosine), integrating to 1 over the sphere.
+// A lobe that changes over `everywhere_rad` away from its axis too is integrated over wherever
+// texels are not small against that.
 template <typename Lobe>
 Vec3d lobe_average(const Environment& environment, const Lobe& lobe, double width_rad,
-                   const Vec3d& axis) {
+                   const Vec3d& axis, double everywhere_rad = 1e9) {
   const Image& map = environment.radiance;
   const double step = 2 * kPi / map.width, row_step = kPi / map.height;
   const double side = std::max(step, row_step);
   constexpr double kKinkCell = 0.002;
-  const double reach = 50 * side - width_rad;
+  const double reach = 50 * side < everywhere_rad ? 50 * side - width_rad : kPi;
   const double near = reach > 0 ? std::cos(std::min(kPi, reach)) : 2;
   const double bright = 20 * luminance(environment.mean);
   std::vector<double> sine(static_cast<size_t>(map.width)), cosine(sine.size());
@@ -72,7 +74,8 @@ Vec3d lobe_average(const Environment& environment, const Lobe& lobe, double widt
         weight = brute_force::integrate_lobe(lobe, axis, kPi - (x + 1) * step, y * row_step, step,
                                              row_step, cells);
       } else if (c > near || luminance(to_double(map.rgb(x, y))) > bright) {
-        const double scale = width_rad + std::max(0.0, std::acos(c) - side);
+        const double scale =
+            std::min(width_rad + std::max(0.0, std::acos(c) - side), everywhere_rad);
         const int cells = std::clamp(static_cast<int>(std::ceil(8 * side / scale)), 1, 64);
         weight = brute_force::integrate_lobe(lobe, axis, kPi - (x + 1) * step, y * row_step, step,
                                              row_step, cells);

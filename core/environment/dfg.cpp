@@ -126,8 +126,4 @@ Image dfg_table(int size, const DfgTableOptions& options, int threads, Progress&
   return table;
 }
 
-Image ggx_dfg_table(int size, int threads, Progress& progress) {
-  return dfg_table(size, {}, threads, progress);
-}
-
 }  // namespace lightkiln

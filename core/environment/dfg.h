@@ -37,6 +37,5 @@ struct DfgTableOptions {
 // size x size, three channels. Column x holds n.v = (x + 1/2) / size, row y (from the top)
 // roughness = (y + 1/2) / size.
 Image dfg_table(int size, const DfgTableOptions& options, int threads, Progress& progress);
-Image ggx_dfg_table(int size, int threads, Progress& progress);
 
 }  // namespace lightkiln

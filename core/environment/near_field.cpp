@@ -137,6 +137,16 @@ void NearField::cut_columns(double theta, double phi, Workspace& work) const {
   }
 }
 
+double NearField::typical_points() const {
+  Workspace work;
+  cut_columns(kPi / 2, 0, work);
+  const double step = kPi / map_.height;
+  for (double from = 0; from < reach_; from += step) {
+    place_points(from, from + step, 1, -1, work.row_nodes, work.row_weights);
+  }
+  return 2 * static_cast<double>(work.row_nodes.size() * work.column_x.size());
+}
+
 // 1 - cos(angle) between colatitudes t and u at longitudes apart by f is
 //   (1 - cos(t - u)) + sin t sin u (1 - cos f), in which nothing cancels.
 Vec3d NearField::at(const Vec3d& direction, Workspace& work) const {

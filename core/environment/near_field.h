@@ -25,6 +25,8 @@ class NearField {
   NearField(const Image& latlong, double alpha, double split, double tolerance);
 
   double reach_rad() const { return reach_; }
+  // Points that one direction on the equator takes: what its time is proportional to.
+  double typical_points() const;
 
   // Room for one thread.
   struct Workspace {

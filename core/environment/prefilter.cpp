@@ -1,7 +1,6 @@
 #include "core/environment/prefilter.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <mutex>
 #include <optional>
@@ -85,13 +84,6 @@ Image convolve_lobe(const Environment& environment, const LightStatistics& light
       });
   if (range) *range = report;
   return cube;
-}
-
-Image convolve_lobe(const LightStatistics& light, const LatlongSpectrum& spectrum,
-                    const LobePlan& lobe, int face_size, int threads, Progress& progress,
-                    RangeReport* range) {
-  assert(lobe.split == 0);
-  return convolve_lobe(Environment{}, light, spectrum, lobe, face_size, threads, progress, range);
 }
 
 }  // namespace lightkiln

@@ -37,8 +37,6 @@ inline constexpr int kMaxBands = 1400;
 // GGX lobes that would need more bands than these are split.
 inline constexpr int kSplitBands = 800;
 LobePlan plan_lobe(const LightStatistics& light, const Lobe& lobe, double target);
-// GGX by bands alone, however narrow.
-LobePlan plan_lobe(const LightStatistics& light, double alpha, double target);
 
 // The grid that a level is read from: interpolating it is part of the bound.
 int convolution_rings(int bands);
@@ -57,10 +55,5 @@ struct RangeReport {
 Image convolve_lobe(const Environment& environment, const LightStatistics& light,
                     const LatlongSpectrum& spectrum, const LobePlan& lobe, int face_size,
                     int threads, Progress& progress, RangeReport* range = nullptr);
-
-// The same for a lobe that is not split.
-Image convolve_lobe(const LightStatistics& light, const LatlongSpectrum& spectrum,
-                    const LobePlan& lobe, int face_size, int threads, Progress& progress,
-                    RangeReport* range = nullptr);
 
 }  // namespace lightkiln

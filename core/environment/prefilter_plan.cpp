@@ -145,8 +145,4 @@ LobePlan plan_lobe(const LightStatistics& light, const Lobe& lobe, double target
   return plan_split(light, lobe, target);
 }
 
-LobePlan plan_lobe(const LightStatistics& light, double alpha, double target) {
-  return plan_banded(light, {LobeKind::ggx, alpha}, target);
-}
-
 }  // namespace lightkiln

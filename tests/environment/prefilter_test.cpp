@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/environment/dfg.h"
+#include "core/environment/ggx_lobe.h"
 #include "core/environment/resample.h"
 #include "core/image/decode.h"
 #include "core/sphere/direction_map.h"
@@ -32,10 +33,11 @@ Level prefilter(const Environment& environment, double alpha, int size, double t
                 bool correct = true) {
   Progress progress;
   const LightStatistics light = measure_light(environment);
-  Level level{plan_lobe(light, alpha, target), {}, {}};
+  Level level{plan_lobe(light, {LobeKind::ggx, alpha}, target), {}, {}};
   if (!correct) level.lobe.corrected = false;
   const LatlongSpectrum spectrum = project_for(environment, {&level.lobe, 1}, 1, 2, progress);
-  level.cube = convolve_lobe(light, spectrum, level.lobe, size, 2, progress, &level.range);
+  level.cube =
+      convolve_lobe(environment, light, spectrum, level.lobe, size, 2, progress, &level.range);
   return level;
 }
 
@@ -263,12 +265,12 @@ TEST(Prefilter, ShowsNoSeamAtCubeEdges) {
 TEST(Prefilter, GivesTheSameBitsForAnyNumberOfThreads) {
   const Environment environment = environment_of(reference::test_sky(32, 1e4));
   const LightStatistics light = measure_light(environment);
-  const LobePlan lobe = plan_lobe(light, 0.25, 1e-4);
+  const LobePlan lobe = plan_lobe(light, {LobeKind::ggx, 0.25}, 1e-4);
   std::vector<float> first;
   for (const int threads : {1, 2, 8}) {
     Progress progress;
     const LatlongSpectrum spectrum = project_for(environment, {&lobe, 1}, 1, threads, progress);
-    const Image cube = convolve_lobe(light, spectrum, lobe, 16, threads, progress);
+    const Image cube = convolve_lobe(environment, light, spectrum, lobe, 16, threads, progress);
     if (first.empty()) first = cube.pixels;
     EXPECT_EQ(cube.pixels, first);
   }
