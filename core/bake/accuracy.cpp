@@ -1,10 +1,10 @@
 #include "core/bake/accuracy.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "core/bake/bake.h"
+#include "core/bake/error_curve.h"
 
 namespace lightkiln {
 
@@ -126,35 +126,26 @@ Line fit_line(const std::vector<std::pair<double, double>>& points) {
   return {mean_y - slope * mean_x, slope};
 }
 
-// What the rounds say of error and time as functions of the samples an element takes.
-//
-// Error falls like c N^-beta; the exponent comes from the rounds in which every element took part
-// (later ones show how stopping works, not how sampling does), kept within what randomised
-// quasi-Monte Carlo can do: 0.5 for independent noise, 1.5 for smooth integrands. A single round
-// gives no slope and the independent 0.5 is taken. Time is linear: t0 + b N with t0 >= 0, b > 0.
+// What the rounds say of error and time as functions of the samples an element takes, from those
+// in which every element took part (later ones show how stopping works, not how sampling does).
+// Time is linear: t0 + b N with t0 >= 0, b > 0.
 struct Model {
-  double beta = 0.5;
-  double log_c = 0;
+  ErrorCurve curve;
   Line time;
 };
 
 Model fit_model(const std::vector<Round>& rounds, uint64_t elements) {
-  std::vector<std::pair<double, double>> errors, times;
+  Model model;
+  model.curve.first_samples = std::max<uint64_t>(rounds.front().samples, 1);
+  std::vector<std::pair<double, double>> times;
   double wall_s = 0;
   for (const Round& round : rounds) {
     wall_s += round.wall_s;
     if (!times.empty() && round.elements < elements) break;
     times.emplace_back(static_cast<double>(round.samples), wall_s);
-    const double error = rms_error(round, elements);
-    if (error > 0)
-      errors.emplace_back(std::log(static_cast<double>(round.samples)), std::log(error));
+    model.curve.errors.push_back(rms_error(round, elements));
   }
-  Model model;
-  if (errors.size() >= 2) model.beta = std::clamp(-fit_line(errors).slope, 0.5, 1.5);
-  if (!errors.empty()) {
-    const auto& [log_samples, log_error] = errors.back();
-    model.log_c = log_error + model.beta * log_samples;
-  }
+  model.curve.slope = fitted_slope(model.curve.errors);
   const auto& [samples, seconds] = times.back();
   if (times.size() >= 2) model.time = fit_line(times);
   if (times.size() < 2 || model.time.slope <= 0 || model.time.intercept < 0)
@@ -182,10 +173,8 @@ std::vector<Price> price_errors(const std::vector<Round>& rounds, uint64_t eleme
       }
     }
     if (price.extrapolated) {
-      const double samples = std::exp((model.log_c - std::log(error)) / model.beta);
-      const uint64_t fitted =
-          std::bit_ceil(static_cast<uint64_t>(std::ceil(std::clamp(samples, 1.0, 0x1p50))));
-      price.samples = std::max(fitted, 2 * rounds.back().samples);
+      const uint64_t least = 2 * rounds.back().samples;
+      price.samples = stop_of(model.curve, nullptr, error, least, uint64_t{1} << 50).samples;
       price.seconds = std::max(
           wall_s, model.time.intercept + model.time.slope * static_cast<double>(price.samples));
     }

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/bake/ao_state.h"
+#include "core/bake/error_curve.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/base/statistics.h"
@@ -18,6 +19,8 @@ namespace {
 
 constexpr uint64_t kFirstSamples = 256;  // 16 replicates of 16 points
 constexpr int kPilotRounds = 4;          // 256, 512, 1024 and 2048 samples
+// Of openness where shadows have edges, for want of anything seen.
+constexpr double kUnknownSlope = 0.75;
 constexpr uint64_t kPilotGroups = 64;
 constexpr uint64_t kPilotGroupSize = 8;
 
@@ -43,23 +46,20 @@ std::vector<uint64_t> pilot_vertices(uint64_t vertices, uint64_t seed) {
 struct Pilot {
   std::vector<std::vector<double>> errors;  // [round][element]
   size_t elements = 0;
-  double beta = 0.75;
+  double slope = kUnknownSlope;
   double seconds_per_ray = 0;
   double seconds = 0;
 };
 
-// The slope of log(rms error) against log(samples) over the pilot's rounds.
-double fit_beta(const std::vector<std::vector<double>>& errors) {
-  if (errors.size() < 2) return 0.75;
-  std::vector<double> logs;
+// Root sum of squares over elements, after each round.
+std::vector<double> sums_of_rounds(const std::vector<std::vector<double>>& errors) {
+  std::vector<double> sums;
   for (const auto& round : errors) {
     double sum = 0;
     for (const double error : round) sum += error * error;
-    if (sum <= 0) return 0.75;
-    logs.push_back(0.5 * std::log(sum));
+    sums.push_back(std::sqrt(sum));
   }
-  const double fall = logs.front() - logs.back();
-  return std::clamp(fall / (static_cast<double>(logs.size() - 1) * std::log(2.0)), 0.5, 1.5);
+  return sums;
 }
 
 Pilot run_pilot(const AoState& state, OpennessParameters parameters, Progress& progress) {
@@ -74,7 +74,7 @@ Pilot run_pilot(const AoState& state, OpennessParameters parameters, Progress& p
   const OpennessKernel kernel(*state.tracer, parameters);
   const OpennessBatch batch = estimate_vertices(state, kernel, ids, true, progress);
   pilot.errors = batch.history;
-  pilot.beta = fit_beta(batch.history);
+  pilot.slope = fitted_slope(sums_of_rounds(batch.history), kUnknownSlope);
   uint64_t rays = 0;
   for (const Round& round : batch.report.rounds) rays += round.rays;
   pilot.seconds = wall_seconds() - start_s;
@@ -87,24 +87,18 @@ struct Spending {
   bool extrapolated = false;  // some element needs more rounds than the pilot ran
 };
 
-// What the stopping rule spends on an element for `target`, at most `cap` samples each. Past the
-// pilot's rounds an element's error falls by 2^-beta a doubling.
+// What the stopping rule spends on an element for `target`, at most `cap` samples each.
 Spending spend(const Pilot& pilot, double target, uint64_t cap) {
   Spending spending;
   double sum = 0;
   for (size_t e = 0; e < pilot.elements; ++e) {
     // Only elements without rays have no error at all.
     if (pilot.errors.empty() || pilot.errors[0][e] == 0) continue;
-    uint64_t samples = kFirstSamples;
-    double error = 0;
-    for (int look = 1;; ++look, samples *= 2) {
-      const auto round = static_cast<size_t>(look - 1);
-      const bool seen = round < pilot.errors.size();
-      spending.extrapolated |= !seen;
-      error = seen ? pilot.errors[round][e] : error * std::exp2(-pilot.beta);
-      if (samples >= cap || look_quantile(look) * error <= target) break;
-    }
-    sum += static_cast<double>(std::min(samples, cap));
+    ErrorCurve curve{kFirstSamples, {}, pilot.slope};
+    for (const std::vector<double>& round : pilot.errors) curve.errors.push_back(round[e]);
+    const Stop stop = stop_of(curve, look_quantile, target, kFirstSamples, cap);
+    spending.extrapolated |= stop.extrapolated;
+    sum += static_cast<double>(std::min(stop.samples, cap));
   }
   if (pilot.elements > 0) spending.mean_samples = sum / static_cast<double>(pilot.elements);
   return spending;

@@ -116,7 +116,9 @@ struct ProbeDocument {
   double distance_mean = 0;   // world units, over directions that hit; 0 when none does
   double distance_min = 0;
   double hit_share = 0;
-  double error = 0;  // 95 % half-width, relative to the job's mean luminance
+  // 95 % bound on the root mean square over the sphere of the texels' errors of luminance, relative
+  // to the job's mean luminance.
+  double error = 0;
   AccuracyStatus accuracy = AccuracyStatus::converged;
   ShDocument sh;
   std::string radiance_artifact;

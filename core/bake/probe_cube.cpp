@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 
+#include "core/bake/texel_harmonics.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/sphere/direction_map.h"
@@ -17,110 +18,6 @@ constexpr size_t kBlocksPerWave = 32;
 constexpr size_t kMostTexelsPerBlock = 64;
 constexpr size_t kPathsPerBlock = 1 << 14;
 
-struct Place {
-  int face, x, y;
-};
-Place place_of(uint32_t texel, int size) {
-  const auto n = static_cast<uint32_t>(size);
-  return {static_cast<int>(texel / (n * n)), static_cast<int>(texel % n),
-          static_cast<int>(texel / n % n)};
-}
-
-// d(omega)/d(area of the face [-1, 1]^2) in a unit direction: the distance to the face is
-// 1 / cosine, so cosine / distance^2 = cosine^3, where the cosine is the largest component.
-double face_jacobian(const Vec3d& direction) {
-  const double cosine =
-      std::max({std::abs(direction.x), std::abs(direction.y), std::abs(direction.z)});
-  return cosine * cosine * cosine;
-}
-
-// A point of a texel: the direction through it, and d(omega)/d(area of the face [-1, 1]^2) there,
-// (1 + a^2 + b^2)^(-3/2) for face coordinates a, b: the squared distance to the plane point and its
-// cosine.
-struct CubePoint {
-  Vec3d direction;
-  double jacobian;
-};
-CubePoint cube_point(const Place& place, int size, double within_x, double within_y) {
-  const double s = (place.x + within_x) / size;
-  const double t = (place.y + within_y) / size;
-  const double a = 2 * s - 1, b = 2 * t - 1;
-  const double distance2 = 1 + a * a + b * b;
-  return {cube_direction(place.face, s, t), 1 / (distance2 * std::sqrt(distance2))};
-}
-
-// The integral of every basis function over a texel, by Gauss-Legendre of 3 x 3 points on enough
-// parts, scaled so that the first is exactly the texel's solid angle times y_00.
-void integrate_basis(const Place& place, int size, int bands, double solid_angle,
-                     std::span<double> integral) {
-  static constexpr double kNode = 0.7745966692414834;  // sqrt(3/5)
-  static constexpr double kNodes[3] = {-kNode, 0, kNode};
-  static constexpr double kWeights[3] = {5.0 / 9, 8.0 / 9, 5.0 / 9};
-  const int parts = std::max(1, 16 / size);
-  std::vector<double> basis(integral.size());
-  std::fill(integral.begin(), integral.end(), 0.0);
-  double whole = 0;
-  for (int i = 0; i < 3 * parts; ++i) {
-    for (int j = 0; j < 3 * parts; ++j) {
-      const auto at = [&](int k) { return (k / 3 + 0.5 + 0.5 * kNodes[k % 3]) / parts; };
-      const CubePoint point = cube_point(place, size, at(i), at(j));
-      const double weight = kWeights[i % 3] * kWeights[j % 3] * point.jacobian;
-      sh_evaluate_basis(point.direction, bands, basis);
-      for (size_t c = 0; c < basis.size(); ++c) integral[c] += weight * basis[c];
-      whole += weight;
-    }
-  }
-  for (double& value : integral) value *= solid_angle / whole;
-}
-
-// Gathers one replicate's share of the harmonics of one texel: see sample_texel.
-class TexelHarmonics {
- public:
-  TexelHarmonics(const Place& place, int size, int bands)
-      : bands_(bands), solid_angle_(cube_texel_solid_angle(place.x, place.y, size)) {
-    const size_t count = sh_coefficient_count(bands);
-    integral_.resize(count);
-    basis_.resize(count);
-    basis_sum_.resize(count);
-    radiance_sum_.resize(count);
-    if (bands > 0) integrate_basis(place, size, bands, solid_angle_, integral_);
-  }
-  void begin() {
-    std::fill(basis_sum_.begin(), basis_sum_.end(), 0.0);
-    std::fill(radiance_sum_.begin(), radiance_sum_.end(), Vec3d{});
-    jacobians_ = 0;
-    radiance_ = {};
-  }
-  void add(const CubePoint& point, const Vec3d& radiance) {
-    if (bands_ == 0) return;
-    sh_evaluate_basis(point.direction, bands_, basis_);
-    const Vec3d weighted = radiance * point.jacobian;
-    jacobians_ += point.jacobian;
-    radiance_ += weighted;
-    for (size_t c = 0; c < basis_.size(); ++c) {
-      basis_sum_[c] += point.jacobian * basis_[c];
-      radiance_sum_[c] += weighted * basis_[c];
-    }
-  }
-  // Adds the replicate's coefficients.
-  void end(std::span<Vec3d> coefficients) const {
-    if (bands_ == 0) return;
-    const double scale = solid_angle_ / jacobians_;
-    const Vec3d mean = radiance_ / jacobians_;
-    for (size_t c = 0; c < basis_.size(); ++c) {
-      coefficients[c] += radiance_sum_[c] * scale + mean * (integral_[c] - basis_sum_[c] * scale);
-    }
-  }
-
- private:
-  int bands_;
-  double solid_angle_;
-  double jacobians_ = 0;
-  Vec3d radiance_;
-  std::vector<double> integral_, basis_, basis_sum_;
-  std::vector<Vec3d> radiance_sum_;
-};
-
 double half_width_factor() {
   static const double factor = student_t(0.95, kReplicates - 1) / std::sqrt(double{kReplicates});
   return factor;
@@ -133,44 +30,24 @@ CubeTexels all_texels(int size) {
   all.size = size;
   const auto count = static_cast<uint32_t>(6 * size * size);
   for (uint32_t i = 0; i < count; ++i) {
-    const Place place = place_of(i, size);
+    const CubePlace place = cube_place(i, size);
     all.texels.push_back(i);
     all.shares.push_back(cube_texel_solid_angle(place.x, place.y, size) / (4 * kPi));
   }
   return all;
 }
 
-CubeTexels sparse_texels(int size, int cells, uint64_t seed) {
-  cells = std::min(cells, size);
-  CubeTexels some;
-  some.size = size;
-  for (int face = 0; face < 6; ++face) {
-    for (int row = 0; row < cells; ++row) {
-      for (int column = 0; column < cells; ++column) {
-        const int x0 = size * column / cells, x1 = size * (column + 1) / cells;
-        const int y0 = size * row / cells, y1 = size * (row + 1) / cells;
-        const auto cell = static_cast<uint64_t>((face * cells + row) * cells + column);
-        const uint64_t drawn = hash_combine(seed, cell);
-        const int x = x0 + static_cast<int>(drawn % static_cast<uint64_t>(x1 - x0));
-        const int y = y0 + static_cast<int>((drawn >> 32) % static_cast<uint64_t>(y1 - y0));
-        some.texels.push_back(static_cast<uint32_t>((face * size + y) * size + x));
-        some.shares.push_back(cube_texel_solid_angle(column, row, cells) / (4 * kPi));
-      }
-    }
-  }
-  return some;
-}
-
 CubeSampling::CubeSampling(const RadianceScene& scene, const CubeTexels& texels, const Vec3& origin,
-                           uint64_t key, int bands, int threads)
+                           uint64_t key, int bands, int threads, int replicates)
     : scene_(scene),
       order_(texels),
       origin_(origin),
       key_(key),
       bands_(bands),
       threads_(threads),
+      replicates_(static_cast<uint64_t>(replicates)),
       slots_(texels.texels.size()),
-      harmonics_(kReplicates * sh_coefficient_count(bands)) {
+      harmonics_(replicates_ * sh_coefficient_count(bands)) {
   const auto all = static_cast<size_t>(6 * texels.size * texels.size);
   if (texels.texels.size() == all) return;
   slot_by_texel_.assign(all, kNowhere);
@@ -217,7 +94,7 @@ void CubeSampling::look_directly(bool lamp, uint32_t from, uint32_t to, Progress
                                  double done, RayCounters* counters,
                                  std::vector<Vec3d>* harmonics) {
   constexpr size_t kWave = 1 << 16, kBlock = 1 << 12;
-  const size_t each = size_t{kDirectPerSample} * (to - from), all = kReplicates * each;
+  const size_t each = size_t{kDirectPerSample} * (to - from), all = replicates_ * each;
   const double area = 4.0 / (order_.size * order_.size);
   const size_t coefficients = sh_coefficient_count(bands_);
   std::vector<double> basis(coefficients);
@@ -256,19 +133,14 @@ void CubeSampling::look_directly(bool lamp, uint32_t from, uint32_t to, Progress
 }
 
 // One texel's samples [from, to) of every replicate.
-//
-// With weights w_i = J_i dOmega / sum J, which sum to the texel's solid angle whatever points were
-// drawn, and the mean L' = sum w_i L_i / dOmega, the harmonics take
-//   sum w_i y(d_i) (L_i - L') + L' integral of y = sum w_i y_i L_i + L' (integral y - sum w_i y_i),
-// so that light that does not vary within the texel is integrated without noise.
 void CubeSampling::sample_texel(size_t i, uint32_t from, uint32_t to, Progress& progress,
                                 Block* block) {
-  const Place place = place_of(order_.texels[i], order_.size);
+  const CubePlace place = cube_place(order_.texels[i], order_.size);
   const uint64_t texel_key = hash_combine(key_, order_.texels[i]);
   Texel& slot = slots_[i];
   TexelHarmonics harmonics(place, order_.size, bands_);
   const bool looks = scene_.has_glare() || scene_.has_lamps();
-  for (uint64_t r = 0; r < kReplicates; ++r) {
+  for (uint64_t r = 0; r < replicates_; ++r) {
     progress.check();
     const uint64_t key = hash_combine(texel_key, r);
     const uint64_t pixel_key = hash_combine(key, static_cast<uint64_t>(DimensionSet::probe_pixel));
@@ -295,7 +167,7 @@ Round CubeSampling::advance(Progress& progress, double progress_begin, double pr
   const double wall = wall_seconds(), cpu = process_cpu_seconds();
   const uint32_t from = taken_, to = taken_ == 0 ? kFirstSamples : 2 * taken_;
   const size_t texels = slots_.size();
-  const size_t paths_each = kReplicates * static_cast<size_t>(to - from);
+  const size_t paths_each = replicates_ * (to - from);
   const size_t block_texels =
       std::clamp<size_t>(kPathsPerBlock / paths_each, 1, kMostTexelsPerBlock);
   const size_t wave_texels = kBlocksPerWave * block_texels;
@@ -343,7 +215,7 @@ Round CubeSampling::advance(Progress& progress, double progress_begin, double pr
 }
 
 uint64_t CubeSampling::samples() const {
-  return static_cast<uint64_t>(kReplicates) * taken_;
+  return replicates_ * taken_;
 }
 
 Vec3 CubeSampling::texel(size_t i) const {
@@ -356,25 +228,32 @@ double CubeSampling::mean_luminance() const {
   return sum / static_cast<double>(samples());
 }
 
-double CubeSampling::half_width(size_t i) const {
+double CubeSampling::variance(size_t i) const {
   RunningMoments moments;
-  for (const double sum : slots_[i].luminance) moments.add(sum / static_cast<double>(taken_));
-  return half_width_factor() * std::sqrt(moments.variance());
+  for (uint64_t r = 0; r < replicates_; ++r) {
+    moments.add(slots_[i].luminance[r] / static_cast<double>(taken_));
+  }
+  return moments.variance();
 }
 
-double CubeSampling::error() const {
-  double sum = 0;
+double CubeSampling::half_width(size_t i) const {
+  return half_width_factor() * std::sqrt(variance(i));
+}
+
+CubeError CubeSampling::error() const {
+  CubeErrorSum sum;
   for (size_t i = 0; i < slots_.size(); ++i) {
-    const double half = half_width(i);
-    sum += order_.shares[i] * half * half;
+    double means[kReplicates];
+    for (int r = 0; r < kReplicates; ++r) means[r] = slots_[i].luminance[r] / taken_;
+    sum.add(means, order_.shares[i]);
   }
-  return std::sqrt(sum);
+  return sum.result();
 }
 
 bool CubeSampling::suspicious() const {
   double whole = 0, doubtful = 0;
   for (size_t i = 0; i < slots_.size(); ++i) {
-    const double half = half_width(i), part = order_.shares[i] * half * half;
+    const double part = order_.shares[i] * variance(i);
     whole += part;
     if (slots_[i].tail.suspicious()) doubtful += part;
   }
@@ -384,7 +263,8 @@ bool CubeSampling::suspicious() const {
 ShRgb CubeSampling::harmonics() const {
   ShRgb sh(bands_);
   for (size_t i = 0; i < harmonics_.size(); ++i) {
-    sh.coefficients[i % sh.coefficients.size()] += harmonics_[i] * (1.0 / kReplicates);
+    const double part = 1 / static_cast<double>(replicates_);
+    sh.coefficients[i % sh.coefficients.size()] += harmonics_[i] * part;
   }
   return sh;
 }
@@ -394,7 +274,7 @@ double CubeSampling::harmonics_error() const {
   double largest = 0, first = 0;
   for (size_t c = 0; c < coefficients; ++c) {
     RunningMoments moments;
-    for (size_t r = 0; r < kReplicates; ++r) {
+    for (size_t r = 0; r < replicates_; ++r) {
       moments.add(luminance(harmonics_[r * coefficients + c]));
     }
     if (c == 0) first = std::abs(moments.mean);

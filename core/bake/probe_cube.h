@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/bake/accuracy.h"
+#include "core/bake/cube_error.h"
 #include "core/base/progress.h"
 #include "core/base/statistics.h"
 #include "core/sphere/harmonics.h"
@@ -30,16 +31,15 @@ struct CubeTexels {
   std::vector<double> shares;    // of the sphere, that each stands for; they sum to 1
 };
 CubeTexels all_texels(int size);
-// One texel, drawn by `seed`, of each cell of a grid of at most `cells` a side over every face.
-CubeTexels sparse_texels(int size, int cells, uint64_t seed);
 
 inline constexpr uint32_t kDirectPerSample = 16;
 
 class CubeSampling {
  public:
-  // Keeps references. `bands` = 0 leaves the harmonics out; otherwise `texels` are all.
+  // Keeps references. `bands` = 0 leaves the harmonics out; they mean something only where `texels`
+  // are all. `replicates` is at most kReplicates, and fewer tell no more than texels' variances.
   CubeSampling(const RadianceScene& scene, const CubeTexels& texels, const Vec3& origin,
-               uint64_t key, int bands, int threads);
+               uint64_t key, int bands, int threads, int replicates = kReplicates);
 
   // Brings every texel to kFirstSamples a replicate, then to twice what it has. The result's
   // errors are left 0. Throws Error{cancelled}.
@@ -50,8 +50,10 @@ class CubeSampling {
   // 95 % half-width of a texel's luminance.
   double half_width(size_t i) const;
   double mean_luminance() const;
-  // Root mean square over the sphere of the texels' 95 % half-widths of luminance.
-  double error() const;
+  // Between the replicates' means of a texel's luminance.
+  double variance(size_t i) const;
+  // Of the texels' luminances.
+  CubeError error() const;
   // True when most of the squared error comes from texels whose samples' tail is heavy (TailGuard):
   // such an estimate of variance cannot be trusted.
   bool suspicious() const;
@@ -91,6 +93,7 @@ class CubeSampling {
   uint64_t key_;
   int bands_;
   int threads_;
+  uint64_t replicates_;
   uint32_t taken_ = 0;  // a replicate
   std::vector<Texel> slots_;
   std::vector<uint32_t> slot_by_texel_;  // empty when all texels are asked for

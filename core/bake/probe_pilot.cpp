@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/bake/probe_cube.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 
@@ -16,10 +15,6 @@ constexpr uint64_t kPilotProbes = 4;
 constexpr uint64_t kCandidates = 64;
 constexpr uint32_t kReferencePaths = 1024;  // a replicate; rounds of the path sampler end here
 constexpr size_t kPathsPerBlock = 256;
-constexpr int kPilotRounds = 3;
-// Texels over all pilot probes: at most so many, and this share of what is ordered.
-constexpr double kPilotTexels = 864;
-constexpr double kPilotShare = 0.25;
 // Deep enough that the mean albedo leaves a hundredth.
 constexpr double kPilotRest = 0.01;
 
@@ -104,40 +99,6 @@ double pilot_luminance(ProbesState& state, const std::vector<uint64_t>& probes,
       },
       0, 0.3);
   return std::accumulate(sums.begin(), sums.end(), 0.0) / static_cast<double>(count);
-}
-
-std::vector<Round> pilot_rounds(ProbesState& state, const Plan& plan,
-                                const std::vector<uint64_t>& probes, Progress& progress) {
-  const RadianceScene& scene = state.radiance_for(plan_selection(state, plan));
-  const int size = state.parameters().cubemap.size;
-  const double all = static_cast<double>(plan.elements) * 6 * size * size;
-  const double wanted = std::min(kPilotTexels, kPilotShare * all);
-  const int cells =
-      std::max(2, static_cast<int>(std::sqrt(wanted / (6 * static_cast<double>(probes.size())))));
-  std::vector<Round> rounds(kPilotRounds);
-  double done = 0.3;
-  for (const uint64_t probe : probes) {
-    const uint64_t key = state.key(kPilotStream, probe);
-    const CubeTexels texels = sparse_texels(size, cells, key);
-    CubeSampling sampling(scene, texels, state.origin(probe), hash_combine(key, 1), 0,
-                          state.grants.threads);
-    const double scale = all / static_cast<double>(probes.size() * texels.texels.size());
-    for (Round& total : rounds) {
-      const double next = done + 0.7 / static_cast<double>(probes.size() * kPilotRounds);
-      const Round round = sampling.advance(progress, done, next);
-      done = next;
-      const double error = sampling.error() / plan.reference_luminance;
-      total.samples = round.samples;
-      total.rays += static_cast<uint64_t>(static_cast<double>(round.rays) * scale);
-      total.elements = plan.elements;
-      total.cpu_s += round.cpu_s * scale;
-      total.wall_s += round.wall_s * scale;
-      total.error_sum_sq +=
-          error * error * static_cast<double>(plan.elements) / static_cast<double>(probes.size());
-      total.error_max = std::max(total.error_max, error);
-    }
-  }
-  return rounds;
 }
 
 }  // namespace lightkiln

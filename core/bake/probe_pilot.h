@@ -1,6 +1,6 @@
 #pragma once
 
-// Runs before the bake: the job's mean luminance, and what samples cost and bring.
+// Runs before the bake: which probes stand for all, and the job's mean luminance.
 
 #include <cstdint>
 #include <vector>
@@ -16,10 +16,5 @@ std::vector<uint64_t> pilot_probes(const ProbesState& state);
 // The mean luminance over the sphere around the pilot probes, with every effect the survey calls
 // for: a pure function of spec and inputs. 0 when no light was found.
 double pilot_luminance(ProbesState& state, const std::vector<uint64_t>& probes, Progress& progress);
-
-// Three rounds on some texels, as `plan` orders them; times are scaled to all texels of all
-// elements, errors are relative to plan.reference_luminance.
-std::vector<Round> pilot_rounds(ProbesState& state, const Plan& plan,
-                                const std::vector<uint64_t>& probes, Progress& progress);
 
 }  // namespace lightkiln

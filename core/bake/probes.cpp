@@ -89,18 +89,15 @@ ProbeResult bake_probe(ProbesState& state, const RadianceScene& scene, const Cub
 
   CubeSampling sampling(scene, texels, origin, key, parameters.sh.bands, state.grants.threads);
   double done = 0;
-  int looks = 0;
   bool reached = false;
   do {
     const double next = 0.5 * (1 + done);
     Round round = sampling.advance(progress, progress_begin + progress_width * done,
                                    progress_begin + progress_width * next);
-    result.error = sampling.error() / plan.reference_luminance;
+    result.error = sampling.error().bound(kLookConfidence) / plan.reference_luminance;
     round.error_sum_sq = result.error * result.error;
     round.error_max = result.error;
-    // Before the fewest samples nothing is decided, so nothing is spent.
-    if (sampling.samples() >= plan.min_samples) ++looks;
-    reached = result.error * look_widening(looks) <= target;
+    reached = result.error <= target;
     round.converged = reached ? 1 : 0;
     report->rounds.push_back(round);
     done = std::max(next, share_done(result.error, target));

@@ -100,8 +100,8 @@ Assembly probes_assemble(ProbesState& state, const Plan& plan, std::span<const C
   }
   assembly.accuracy =
       summarise_accuracy(reports, target, plan.predicted_s,
-                         "95 % half-width of texel luminance, root mean square over the sphere, "
-                         "relative to the job's mean luminance");
+                         "95 % bound on the cube's error: texel luminance, root mean square over "
+                         "the sphere, relative to the job's mean luminance");
   assembly.document = std::move(document);
   return assembly;
 }

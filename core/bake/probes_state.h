@@ -42,18 +42,13 @@ inline constexpr uint64_t kPilotStream = 2;
 // The selection that a plan stands for.
 EffectSelection plan_selection(const ProbesState& state, const Plan& plan);
 
-// What the stopping rule demands beyond a plain 95 % half-width at its k-th look (0 counts as 1).
-inline double look_widening(int look) {
-  return look_quantile(look) / student_t(0.95, kReplicates - 1);
-}
-
 // One probe's result, as chunk bytes carry it.
 struct ProbeResult {
   uint64_t index = 0;
   ProbeSurroundings surroundings;
   AccuracyStatus accuracy = AccuracyStatus::converged;
   uint64_t samples = 0;  // a texel
-  double error = 0;
+  double error = 0;      // see ProbeDocument
   ShRgb sh;
   double sh_error = 0;
   std::vector<float> radiance;  // stacked cube, RGB

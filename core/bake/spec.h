@@ -82,8 +82,9 @@ struct InputRef {
 };
 
 struct Accuracy {
-  // 95 % confidence half-width per element: absolute for ambient occlusion, relative to the job's
-  // mean luminance for radiance. > 0, <= 1. None = the kind's default (0.02, 0.001, 0.05). Halving
+  // 95 % confidence half-width per element: absolute for ambient occlusion; for a probe that of its
+  // cube, the root mean square of its texels' errors over the sphere, relative to the job's mean
+  // luminance. > 0, <= 1. None = the kind's default (0.02, 0.001, 0.05). Halving
   // it costs about 2.6 times the time where shadows have edges, 4 times where noise is independent.
   std::optional<double> target_error;
   // Samples per element and texel at the most, rounded up to a power of two; 64..1048576. None =

@@ -91,6 +91,20 @@ double student_t(double confidence, int degrees_of_freedom) {
   return 0.5 * (low + high);
 }
 
+// P(F > f) = I_{n / (n + m f)}(n / 2, m / 2) for m over n degrees (Abramowitz and Stegun 26.6.2).
+double f_quantile(double confidence, double numerator_degrees, double denominator_degrees) {
+  const double m = numerator_degrees, n = denominator_degrees, wanted = 1 - confidence;
+  const auto tail = [&](double f) { return incomplete_beta(0.5 * n, 0.5 * m, n / (n + m * f)); };
+  double low = 0;
+  double high = 1;
+  while (tail(high) > wanted && high < 1e15) high *= 2;
+  for (int i = 0; i < 100 && high - low > 1e-12 * high; ++i) {
+    const double middle = 0.5 * (low + high);
+    (tail(middle) > wanted ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
 namespace {
 
 double replicate_variance_of_mean(std::span<const double> means) {

@@ -24,6 +24,10 @@ struct RunningMoments {
 // The two-sided quantile of Student's t: P(|T| <= t) = confidence.
 double student_t(double confidence, int degrees_of_freedom);
 
+// The quantile of Fisher's F: P(F <= f) = confidence, for the ratio of two mean squares with the
+// given degrees of freedom (above 0, need not be whole; the second at least as large as 1).
+double f_quantile(double confidence, double numerator_degrees, double denominator_degrees);
+
 // 95 % confidence half-width of the mean of `replicate_means`: t_{R-1} * s / sqrt(R).
 double replicate_half_width(std::span<const double> replicate_means, double confidence = 0.95);
 

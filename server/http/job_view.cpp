@@ -21,7 +21,7 @@ double job_fraction(const JobRecord& job) {
 std::string error_unit(const std::string& kind) {
   if (kind == kind_name(Kind::ambient_occlusion)) return "95 % half-width of openness, absolute";
   if (kind == kind_name(Kind::probes))
-    return "95 % half-width, relative to the job's mean luminance";
+    return "95 % bound on the cube's error, relative to the job's mean luminance";
   return "bound, relative to the map's mean luminance";
 }
 

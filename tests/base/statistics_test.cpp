@@ -31,6 +31,18 @@ TEST(Statistics, QuantilesOfStudentMatchTheTables) {
   EXPECT_NEAR(student_t(0.95, 1000000), 1.95996, 1e-4);
 }
 
+// Tables of F; one degree of freedom gives the square of Student's t.
+TEST(Statistics, FQuantilesMatchTables) {
+  EXPECT_NEAR(f_quantile(0.95, 2, 15), 3.68232, 1e-5);
+  EXPECT_NEAR(f_quantile(0.95, 10, 20), 2.34788, 1e-5);
+  EXPECT_NEAR(f_quantile(0.99, 5, 30), 3.69902, 1e-5);
+  EXPECT_NEAR(f_quantile(0.95, 1, 15), std::pow(student_t(0.95, 15), 2), 1e-9);
+  EXPECT_NEAR(f_quantile(0.999, 1, 15), std::pow(student_t(0.999, 15), 2), 1e-8);
+  // Many degrees: close to 1.
+  EXPECT_NEAR(f_quantile(0.5, 4096, 61440), 1, 1e-3);
+  EXPECT_LT(f_quantile(0.95, 4096, 61440), 1.04);
+}
+
 TEST(Statistics, SumOfManyEqualFloatsIsExact) {  // R1
   const std::vector<float> ones(40'000'000, 1.0f);
   EXPECT_EQ(tree_sum(ones), 4e7);
