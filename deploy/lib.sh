@@ -1,4 +1,4 @@
-# Shared by quickstart, test and bench; sourced, never run. Debian package names live here only.
+# Shared by quickstart, test, bench and the container; sourced, never run. Debian package names live here only.
 
 set -euo pipefail
 
@@ -9,6 +9,11 @@ build_packages=(
   libcpp-httplib-dev libdraco-dev libembree-dev libcli11-dev libmeshoptimizer-dev libopenexr-dev
   libseccomp-dev libsqlite3-dev libssl-dev libstb-dev libtbb-dev libtinygltf-dev
   nlohmann-json3-dev zlib1g-dev
+)
+# What the programs load; everything else is for building them.
+runtime_packages=(
+  ca-certificates libcpp-httplib0.11 libdraco7 libembree3-3 libmeshoptimizer2d libopenexr-3-1-30
+  libseccomp2 libsqlite3-0 libssl3 libstdc++6 libtbb12 zlib1g
 )
 test_packages=(
   chromium curl libbenchmark-dev libgtest-dev librapidcheck-dev openexr openimageio-tools strace wrk
@@ -56,4 +61,14 @@ build() {
   cmake -S "$project" -B "$folder" -G Ninja "$@" >"$folder.configure.log" 2>&1 ||
     { cat "$folder.configure.log" >&2; fail "CMake could not configure $folder"; }
   cmake --build "$folder" ${targets[@]:+--target "${targets[@]}"}
+}
+
+# The three programs, optimised and without tests, in FOLDER. CMake arguments may follow.
+build_release() {
+  local folder=$1; shift
+  install_packages "${build_packages[@]}"
+  install_node
+  install_npm "$project/server/web"
+  mkdir -p "$(dirname "$folder")"
+  build "$folder" kilnd kiln kiln-oven -- -DCMAKE_BUILD_TYPE=Release -DLIGHTKILN_TESTS=OFF "$@"
 }

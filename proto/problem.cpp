@@ -38,10 +38,16 @@ constexpr ProblemKind kKindsOfProblem[] = {
     {"forbidden", 403, "This is not allowed", false, ErrorCode::forbidden,
      "The request comes from a place, or is of a sort, that the daemon does not accept."},
     {"unavailable", 503, "Try again later", true, ErrorCode::unavailable,
-     "The daemon cannot take this now: it is full, short of disk, or stopping. Retry-After says "
-     "when to ask again."},
+     "The daemon cannot take this now: it is busy or stopping. Retry-After says when to ask "
+     "again."},
     {"internal", 500, "The service made a mistake", false, ErrorCode::internal,
      "Something failed inside the service. The log has the details under the instance given."},
+    // Raised by the store beside `unavailable`.
+    {"storage_full", 507, "The disk is full", true, ErrorCode::unavailable,
+     "The store's disk has no room for this. Its operator must make some, for example by deleting "
+     "jobs; Retry-After says when to ask again."},
+    {"queue_full", 429, "The queue is full", true, ErrorCode::unavailable,
+     "As many jobs wait as the daemon takes. Retry-After says when to ask again."},
     // Raised by the HTTP layer alone.
     {"malformed_json", 400, "The body is not JSON", false, ErrorCode::invalid_spec,
      "The body must be one JSON text in UTF-8 with no key twice in an object."},

@@ -41,6 +41,7 @@ void add_grants(CLI::App& app, Config& config) {
   app.add_option("--allow-missing-sandbox", config.allow_missing_sandbox,
                  "Bake although this machine lacks these layers of an oven's sandbox, or 'all'")
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->check(CLI::IsMember(layer_names()));
   app.add_option("--lease-ms", config.lease_ms, "Time after which a silent worker loses its task")
       ->check(CLI::Range(500, 3600000))
@@ -66,6 +67,11 @@ void add_serve(CLI::App& app, ServeConfig& config, std::string& listen, std::str
   app.add_option("--allow-host", config.hosts, "Further name that clients may call this host by");
   app.add_flag("--parent-watch", config.parent_watch, "Stop when the parent process ends");
   app.add_option("--log-level", level, "error, warning, info or debug")->default_str(level);
+  app.add_option(
+         "--keep-unused-days", config.keep_unused_days,
+         "Days that uploads are kept which no job refers to and nobody asks for; 0 = for ever")
+      ->check(CLI::Range(0.0, 36500.0))
+      ->capture_default_str();
   app.add_option("--max-connections", config.max_connections, "Open connections in all")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();

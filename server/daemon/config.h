@@ -28,6 +28,7 @@ struct ServeConfig {
   double chunk_seconds = WorkerOptions().chunk_seconds;
   double task_seconds = WorkerOptions().task_seconds;
   std::vector<std::string> allow_missing_sandbox;  // as WorkerOptions
+  double keep_unused_days = 7;                     // blobs that no job refers to; 0 = for ever
   int max_connections = 256;
   int max_connections_per_address = 32;
   // The program started as `worker`, and the one that workers start as oven.

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "core/base/error.h"
+#include "server/daemon/housekeeper.h"
 #include "server/daemon/supervisor.h"
 #include "server/http/api.h"
 #include "server/http/fence.h"
@@ -90,7 +91,8 @@ struct Daemon::Impl {
         api(*store, log, api_options(config)),
         fence(fence_limits(config), api.application()),
         port(fence.listen(config.host, config.port)),
-        supervisor(log, worker_commands(config)) {
+        supervisor(log, worker_commands(config)),
+        housekeeper(*store, log, config.keep_unused_days * 24 * 3600) {
     if (!config.port_file.empty()) write_port_file(config.port_file, port);
     log.write(LogLevel::info, "serving",
               {{"host", std::string_view(config.host)},
@@ -104,6 +106,7 @@ struct Daemon::Impl {
   Fence fence;
   const int port;
   Supervisor supervisor;
+  Housekeeper housekeeper;
 };
 
 Daemon::Daemon(const ServeConfig& config) {

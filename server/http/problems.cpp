@@ -1,11 +1,20 @@
 #include "server/http/problems.h"
 
+#include "server/store/refusal.h"
+
 namespace lightkiln {
 
 namespace {
 
 std::string instance_of(const std::string& request_id) {
   return "urn:request:" + request_id;
+}
+
+// How soon trying again can help: places in a queue come free as jobs end, room on a disk when an
+// operator makes some.
+const char* retry_after_s(const Problem& problem) {
+  if (problem.code == kQueueFull) return "10";
+  return problem.status == 429 || problem.status == 507 ? "60" : "2";
 }
 
 }  // namespace
@@ -57,11 +66,14 @@ HttpReply problem_reply(const Problem& problem) {
   reply.media_type = kProblemMediaType;
   reply.body = write_problem(problem);
   reply.set("Cache-Control", "no-store");
-  if (problem.retryable) reply.set("Retry-After", problem.status == 429 ? "60" : "2");
+  if (problem.retryable) reply.set("Retry-After", retry_after_s(problem));
   return reply;
 }
 
 HttpReply error_reply(const Error& error, const std::string& request_id) {
+  if (const auto* refusal = dynamic_cast<const StoreRefusal*>(&error))
+    return problem_reply(
+        make_problem(refusal->problem_code(), refusal->what(), instance_of(request_id)));
   return problem_reply(problem_from_error(error, instance_of(request_id)));
 }
 

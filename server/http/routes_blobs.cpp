@@ -1,6 +1,6 @@
 // Immutable bytes by their digest: uploaded once, while they are hashed.
 
-#include <algorithm>
+#include <unordered_set>
 
 #include "proto/messages.h"
 #include "server/http/problems.h"
@@ -58,12 +58,11 @@ HttpReply fetch_blob(RouteContext& context, RouteCall& call) {
 HttpReply missing_blobs(RouteContext& context, RouteCall& call) {
   const ParsedDigests parsed = parse_digests(call.request.body);
   if (!parsed.faults.empty()) return faults_reply(parsed.faults, call.request.head.request_id);
-  std::vector<std::string> missing;
+  std::vector<std::string> asked;
+  std::unordered_set<std::string> seen;
   for (const std::string& digest : parsed.digests)
-    if (!context.store.has_blob(digest) &&
-        std::find(missing.begin(), missing.end(), digest) == missing.end())
-      missing.push_back(digest);
-  return json_reply(write_missing(missing));
+    if (seen.insert(digest).second) asked.push_back(digest);
+  return json_reply(write_missing(context.store.missing_blobs(asked)));
 }
 
 }  // namespace

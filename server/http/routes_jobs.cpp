@@ -13,9 +13,8 @@ namespace lightkiln {
 namespace {
 
 constexpr uint64_t kUntilTerminal = UINT64_MAX;
-// A record of the store carries its whole spec, up to kMaxRequestBytes: only so many are held at a
-// time while a page is made.
-constexpr int kRecordsAtATime = 8;
+// Records held at a time while a page is made.
+constexpr int kRecordsAtATime = 64;
 // A page ends after the job that brings it here.
 constexpr size_t kPageBytes = 1 << 20;
 
@@ -98,8 +97,7 @@ HttpReply validate_job(RouteContext& context, RouteCall& call) {
   const ParsedJobRequest parsed = parse_job_request(call.request.body);
   if (!parsed.faults.empty()) return faults_reply(parsed.faults, call.request.head.request_id);
   ValidationMessage message{parsed.request.canonical, parsed.request.spec_digest, {}};
-  for (const std::string& digest : input_digests(parsed.request.spec))
-    if (!context.store.has_blob(digest)) message.missing_blobs.push_back(digest);
+  message.missing_blobs = context.store.missing_blobs(input_digests(parsed.request.spec));
   return json_reply(write_validation(message));
 }
 

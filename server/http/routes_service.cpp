@@ -101,10 +101,9 @@ HttpReply metrics(RouteContext& context, RouteCall&) {
     if (slash != std::string::npos)
       text += "lightkiln_jobs{kind=\"" + name.substr(0, slash) + "\",state=\"" +
               name.substr(slash + 1) + "\"}" + value;
-    else if (name == "events")  // numbers of events only grow
-      totals += "# TYPE lightkiln_events_total counter\nlightkiln_events_total" + value;
     else
-      totals += "# TYPE lightkiln_" + name + " gauge\nlightkiln_" + name + value;
+      totals += "# TYPE lightkiln_" + name + (name.ends_with("_total") ? " counter" : " gauge") +
+                "\nlightkiln_" + name + value;
   }
   std::map<std::string, int> missing_layers;
   const std::vector<WorkerRecord> workers = context.store.workers();

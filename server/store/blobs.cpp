@@ -9,9 +9,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "core/base/error.h"
 #include "server/store/job_id.h"
 #include "server/store/process_identity.h"
+#include "server/store/refusal.h"
 #include "server/store/storage_failure.h"
 
 namespace lightkiln {
@@ -23,6 +23,10 @@ namespace {
 constexpr std::string_view kPrefix = "sha256:";
 constexpr size_t kPiece = 1u << 20;
 
+std::string shard_name(int shard) {
+  return {'/', "0123456789abcdef"[shard >> 4], "0123456789abcdef"[shard & 15]};
+}
+
 std::string_view hex_of(std::string_view digest) {
   const bool good =
       digest.size() == kPrefix.size() + 64 && digest.substr(0, kPrefix.size()) == kPrefix &&
@@ -31,6 +35,13 @@ std::string_view hex_of(std::string_view digest) {
     throw Error(ErrorCode::invalid_input,
                 "A digest must read 'sha256:' and 64 lower-case hexadecimal digits.");
   return digest.substr(kPrefix.size());
+}
+
+// By errno.
+[[noreturn]] void refuse_to_write(const std::string& what) {
+  const std::string sentence = what + ": " + std::strerror(errno) + ".";
+  if (errno == ENOSPC || errno == EDQUOT) throw StoreRefusal(kStorageFull, sentence);
+  throw Error(ErrorCode::unavailable, sentence);
 }
 
 void fsync_folder(const std::string& path) {
@@ -64,10 +75,7 @@ void sweep_drafts(const fs::path& folder) {
 Blobs::Blobs(const std::string& root) : root_(root), draft_prefix_(make_draft_prefix()) {
   fs::create_directories(root_ + "/incoming");
   fs::create_directories(root_ + "/quarantine");
-  for (int shard = 0; shard < 256; ++shard) {
-    const char name[] = {'/', "0123456789abcdef"[shard >> 4], "0123456789abcdef"[shard & 15], 0};
-    fs::create_directory(root_ + name);
-  }
+  for (int shard = 0; shard < kBlobShards; ++shard) fs::create_directory(root_ + shard_name(shard));
   fsync_folder(root_);
   sweep_drafts(root_ + "/incoming");
 }
@@ -78,9 +86,7 @@ Blobs::Draft::Draft(Blobs& blobs) : blobs_(blobs) {
     path_ = blobs_.root_ + "/incoming/" + blobs_.draft_prefix_ + std::to_string(++blobs_.drafts_);
   }
   fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
-  if (fd_ < 0)
-    throw Error(ErrorCode::unavailable,
-                std::string("The store cannot make a file: ") + std::strerror(errno) + ".");
+  if (fd_ < 0) refuse_to_write("The store cannot make a file");
 }
 
 Blobs::Draft::~Draft() {
@@ -94,9 +100,7 @@ void Blobs::Draft::append(const void* data, size_t size) {
   while (size > 0) {
     const ssize_t written = write(fd_, next, size);
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0)
-      throw Error(ErrorCode::unavailable,
-                  std::string("The store cannot write: ") + std::strerror(errno) + ".");
+    if (written < 0) refuse_to_write("The store cannot write");
     next += written;
     size -= static_cast<size_t>(written);
   }
@@ -210,6 +214,21 @@ void Blobs::remove(const std::string& digest) {
   unlink(path_of(digest).c_str());
   const std::lock_guard lock(mutex_);
   verified_.erase(digest);
+}
+
+std::vector<std::pair<std::string, uint64_t>> Blobs::older_than(int64_t unix_ms, int shard) const {
+  std::vector<std::pair<std::string, uint64_t>> found;
+  for (const fs::directory_entry& entry : fs::directory_iterator(root_ + shard_name(shard))) {
+    struct stat info {};
+    const std::string name = entry.path().filename().string();
+    if (name.size() != 64 || lstat(entry.path().c_str(), &info) != 0 || !S_ISREG(info.st_mode))
+      continue;
+    const int64_t written_ms =
+        static_cast<int64_t>(info.st_mtim.tv_sec) * 1000 + info.st_mtim.tv_nsec / 1'000'000;
+    if (written_ms < unix_ms)
+      found.emplace_back(std::string(kPrefix) + name, static_cast<uint64_t>(info.st_size));
+  }
+  return found;
 }
 
 void Blobs::quarantine(const std::string& digest) {

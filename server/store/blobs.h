@@ -11,10 +11,14 @@
 #include <string>
 #include <string_view>
 #include <unordered_set>
+#include <utility>
+#include <vector>
 
 #include "proto/digest.h"
 
 namespace lightkiln {
+
+inline constexpr int kBlobShards = 256;
 
 class Blobs {
  public:
@@ -51,6 +55,9 @@ class Blobs {
   // Whole contents, verified on every read.
   std::string read(const std::string& digest);
   void remove(const std::string& digest);
+  // Digest and bytes of every blob that was written before `unix_ms` and whose first two digits are
+  // `shard`, 0 to 255.
+  std::vector<std::pair<std::string, uint64_t>> older_than(int64_t unix_ms, int shard) const;
 
  private:
   // Present, found whole by this process, and durable under its name.

@@ -4,7 +4,7 @@
 
 #include <sqlite3.h>
 
-#include "core/base/error.h"
+#include "server/store/refusal.h"
 #include "server/store/storage_failure.h"
 
 namespace lightkiln {
@@ -20,7 +20,7 @@ namespace {
     case SQLITE_BUSY:
       throw Error(ErrorCode::unavailable, "The store is busy; try again.");
     case SQLITE_FULL:
-      throw Error(ErrorCode::unavailable, "The disk of the store is full.");
+      throw StoreRefusal(kStorageFull, "The disk of the store is full.");
     case SQLITE_NOMEM:
       throw Error(ErrorCode::out_of_memory, "The store ran out of memory.");
     default:

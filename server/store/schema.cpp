@@ -86,6 +86,12 @@ CREATE TABLE workers(
     R"sql(
 ALTER TABLE workers ADD COLUMN missing_layers TEXT NOT NULL DEFAULT '';
 )sql",
+    // When a client last sent a blob, asked for it or ordered with it, in Unix milliseconds.
+    R"sql(
+ALTER TABLE uploads ADD COLUMN used_ms INTEGER NOT NULL DEFAULT 0;
+UPDATE uploads SET used_ms=CAST(strftime('%s','now') AS INTEGER)*1000;
+INSERT INTO counters VALUES ('collected_blobs', 0), ('collected_bytes', 0);
+)sql",
 };
 constexpr int kSchemaVersion = sizeof(kMigrations) / sizeof(kMigrations[0]);
 

@@ -116,14 +116,21 @@ void SqliteStore::sum_chunks(Database& db, const std::string& id) {
 // nobody can begin to refer to it in between. A crash between the two leaves a file too many.
 void SqliteStore::remove_orphans(Database& db, const std::vector<std::string>& digests) {
   for (const std::string& digest : digests) {
-    const int64_t users = db.number(
-        0,
-        "SELECT EXISTS(SELECT 1 FROM uploads WHERE digest=?1) OR EXISTS(SELECT 1 FROM inputs WHERE "
-        "digest=?1) OR EXISTS(SELECT 1 FROM artifacts WHERE digest=?1) OR EXISTS(SELECT 1 FROM "
-        "tasks WHERE digest=?1 AND digest<>'')",
-        digest);
-    if (users == 0) blobs_.remove(digest);
+    if (!was_used_since(db, digest, 0) && !is_referred_to(db, digest)) blobs_.remove(digest);
   }
+}
+
+bool SqliteStore::is_referred_to(Database& db, const std::string& digest) {
+  return db.number(0,
+                   "SELECT EXISTS(SELECT 1 FROM inputs WHERE digest=?1) OR EXISTS(SELECT 1 FROM "
+                   "artifacts WHERE digest=?1) OR EXISTS(SELECT 1 FROM tasks WHERE digest=?1 AND "
+                   "digest<>'')",
+                   digest) != 0;
+}
+
+bool SqliteStore::was_used_since(Database& db, const std::string& digest, int64_t used_ms) {
+  return db.number(0, "SELECT EXISTS(SELECT 1 FROM uploads WHERE digest=?1 AND used_ms>=?2)",
+                   digest, used_ms) != 0;
 }
 
 }  // namespace lightkiln

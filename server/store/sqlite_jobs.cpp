@@ -59,10 +59,9 @@ JobRecord SqliteStore::read_job(Database& db, const Statement& row, bool documen
 
   Statement labels = db.query("SELECT key, value FROM labels WHERE job_id=?1", job.id);
   while (labels.step()) job.labels[labels.text(0)] = labels.text(1);
-  Statement texts = db.query(
-      "SELECT spec_json, CASE WHEN ?2 THEN plan_json ELSE '' END, CASE WHEN ?2 THEN accuracy_json "
-      "ELSE '' END FROM documents WHERE job_id=?1",
-      job.id, documents ? 1 : 0);
+  if (!documents) return job;
+  Statement texts =
+      db.query("SELECT spec_json, plan_json, accuracy_json FROM documents WHERE job_id=?1", job.id);
   if (texts.step()) {
     job.spec_json = texts.text(0);
     job.plan_json = texts.text(1);
@@ -181,6 +180,13 @@ std::optional<std::string> SqliteStore::replay(Database& db, const Submission& s
   return std::nullopt;
 }
 
+// The age of an unused upload counts from its last order, and from when that was forgotten.
+void SqliteStore::touch_inputs(Database& db, const std::string& id) {
+  db.run(
+      "UPDATE uploads SET used_ms=?2 WHERE digest IN (SELECT digest FROM inputs WHERE job_id=?1)",
+      id, wall_clock_ms());
+}
+
 SubmitResult SqliteStore::submit(const Submission& submission) {
   require_space();
   Writer writer(*this);
@@ -194,7 +200,7 @@ SubmitResult SqliteStore::submit(const Submission& submission) {
     throw Error(ErrorCode::not_found, "Upload these inputs first: " + missing + ".");
   if (static_cast<uint64_t>(db.number(0, "SELECT count(*) FROM jobs WHERE state=?1",
                                       static_cast<int>(JobState::queued))) >= options_.max_queued)
-    throw Error(ErrorCode::unavailable, "The queue is full; try again later.");
+    throw StoreRefusal(kQueueFull, "The queue is full; try again later.");
 
   std::string last;
   {
@@ -214,6 +220,7 @@ SubmitResult SqliteStore::submit(const Submission& submission) {
     db.run("INSERT INTO labels VALUES(?1,?2,?3)", id, key, value);
   for (const std::string& digest : submission.inputs)
     db.run("INSERT OR IGNORE INTO inputs VALUES(?1,?2)", id, digest);
+  touch_inputs(db, id);
   if (!submission.idempotency_key.empty())
     db.run("INSERT INTO idempotency VALUES(?1,?2,?3,?4)", submission.idempotency_key,
            submission.request_digest, id, now_ms);
@@ -271,6 +278,7 @@ void SqliteStore::remove(const std::string& id) {
     while (rows.step()) orphans.push_back(rows.text(0));
   }
   raise_version(db);
+  touch_inputs(db, id);
   db.run("DELETE FROM jobs WHERE id=?1", id);
   writer.commit();
   remove_orphans(db, orphans);

@@ -136,7 +136,7 @@ SqliteStore::ReadAccess::~ReadAccess() {
 
 void SqliteStore::require_space() const {
   if (free_bytes_of(options_.directory) < options_.min_free_bytes)
-    throw Error(ErrorCode::unavailable, "The disk of the store is almost full.");
+    throw StoreRefusal(kStorageFull, "The disk of the store is almost full.");
 }
 
 // --- blobs ---------------------------------------------------------------------------------------
@@ -182,7 +182,10 @@ void SqliteStore::keep_upload(const std::string& digest) {
   Writer writer(*this);
   if (!blobs_.has(digest))
     throw Error(ErrorCode::unavailable, "The blob was removed while it arrived; send it again.");
-  writer.db().run("INSERT OR IGNORE INTO uploads VALUES(?1)", digest);
+  writer.db().run(
+      "INSERT INTO uploads(digest,used_ms) VALUES(?1,?2) ON CONFLICT(digest) DO UPDATE SET "
+      "used_ms=?2",
+      digest, wall_clock_ms());
   writer.commit();
 }
 
@@ -227,8 +230,12 @@ std::map<std::string, uint64_t> SqliteStore::counts() {
   while (rows.step())
     counts[rows.text(0) + "/" + job_state_name(static_cast<JobState>(rows.integer(1)))] =
         rows.natural(2);
-  counts["events"] =
+  counts["events_total"] =
       static_cast<uint64_t>(read.db().number(0, "SELECT coalesce(max(sequence),0) FROM events"));
+  counts["collected_blobs_total"] = static_cast<uint64_t>(
+      read.db().number(0, "SELECT value FROM counters WHERE name='collected_blobs'"));
+  counts["collected_bytes_total"] = static_cast<uint64_t>(
+      read.db().number(0, "SELECT value FROM counters WHERE name='collected_bytes'"));
   counts["leased_tasks"] =
       static_cast<uint64_t>(read.db().number(0, "SELECT count(*) FROM tasks WHERE state=1"));
   return counts;

@@ -35,6 +35,7 @@ class SqliteStore final : public Store {
   std::unique_ptr<Upload> begin_upload() override;
   std::string put_blob(const std::vector<std::byte>& bytes) override;
   bool has_blob(const std::string& digest) override;
+  std::vector<std::string> missing_blobs(const std::vector<std::string>& digests) override;
   int open_blob(const std::string& digest, uint64_t* size) override;
 
   SubmitResult submit(const Submission& submission) override;
@@ -57,22 +58,29 @@ class SqliteStore final : public Store {
   void commit_plan(const Claim& claim, const std::string& plan_json, uint64_t chunks,
                    double predicted_s) override;
   void commit_chunk(const Claim& claim, const ChunkCommit& chunk) override;
-  std::vector<StoredChunk> load_chunks(const std::string& job_id) override;
+  void load_chunks(const std::string& job_id,
+                   const std::function<void(StoredChunk)>& take) override;
   bool rebake_lost_chunks(const Claim& claim) override;
-  void commit_result(const Claim& claim, const std::vector<NewArtifact>& artifacts,
-                     const std::string& accuracy_json) override;
+  std::unique_ptr<Result> begin_result(const Claim& claim) override;
   void fail_task(const Claim& claim, const JobError& error, bool crashed) override;
   void release(const Claim& claim, const std::string& reason) override;
   void wait_for_work(int64_t wait_ms) override;
+
+  Collected collect_unused(int64_t unused_ms, const std::function<bool()>& stop) override;
 
   StoreHealth health() override;
   std::vector<WorkerRecord> workers() override;
   std::map<std::string, uint64_t> counts() override;
 
-  // Remembers that a client sent these bytes, so that removing a job never takes them away.
+  // Remembers that a client sent these bytes, so that removing a job does not take them away.
   void keep_upload(const std::string& digest);
+  // The end of a Result. False when the lease is lost: nothing was changed.
+  bool commit_artifacts(const Claim& claim, const std::vector<ArtifactRecord>& artifacts,
+                        const std::string& accuracy_json);
+  // Removes those that no job refers to and no client sent.
+  void forget(const std::vector<ArtifactRecord>& artifacts);
   Blobs& blobs() { return blobs_; }
-  // Throws Error{unavailable} below the floor of free space.
+  // Throws StoreRefusal{kStorageFull} below the floor of free space.
   void require_space() const;
 
  private:
@@ -97,7 +105,10 @@ class SqliteStore final : public Store {
   void bake_again(Database& db, const std::string& id, const std::vector<uint64_t>& chunks);
   bool answer_from_cache(Database& db, const std::string& id, const Submission& submission);
   void drop_chunk_bytes(Database& db, const std::string& id, std::vector<std::string>* orphans);
+  void touch_inputs(Database& db, const std::string& id);
   void remove_orphans(Database& db, const std::vector<std::string>& digests);
+  bool is_referred_to(Database& db, const std::string& digest);  // by a job; uploads do not count
+  bool was_used_since(Database& db, const std::string& digest, int64_t used_ms);  // by a client
   void register_worker(Database& db, const std::string& worker, const std::string& missing);
   bool lose_lease(Database& db, const Claim& claim, int losses);
 

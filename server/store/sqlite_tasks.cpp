@@ -3,7 +3,6 @@
 
 #include <sstream>
 
-#include "core/base/parallel.h"
 #include "server/store/event_json.h"
 #include "server/store/process_identity.h"
 #include "server/store/sqlite_store.h"
@@ -12,7 +11,6 @@ namespace lightkiln {
 
 namespace {
 
-constexpr int kWritingThreads = 8;
 constexpr int kWaiting = static_cast<int>(TaskState::waiting);
 constexpr int kChunk = static_cast<int>(TaskType::chunk);
 constexpr int kAssemble = static_cast<int>(TaskType::assemble);
@@ -255,7 +253,8 @@ void SqliteStore::commit_chunk(const Claim& claim, const ChunkCommit& chunk) {
   writer.commit();
 }
 
-std::vector<StoredChunk> SqliteStore::load_chunks(const std::string& job_id) {
+void SqliteStore::load_chunks(const std::string& job_id,
+                              const std::function<void(StoredChunk)>& take) {
   std::vector<std::pair<std::string, std::string>> rows_found;
   {
     ReadAccess read(*this);
@@ -265,13 +264,11 @@ std::vector<StoredChunk> SqliteStore::load_chunks(const std::string& job_id) {
         job_id, kChunk);
     while (rows.step()) rows_found.emplace_back(rows.text(0), rows.text(1));
   }
-  std::vector<StoredChunk> chunks;
   for (const auto& [digest, report] : rows_found) {
     const std::string bytes = blobs_.read(digest);
     const auto* begin = reinterpret_cast<const std::byte*>(bytes.data());
-    chunks.push_back({{begin, begin + bytes.size()}, report});
+    take({{begin, begin + bytes.size()}, report});
   }
-  return chunks;
 }
 
 bool SqliteStore::rebake_lost_chunks(const Claim& claim) {
@@ -307,45 +304,6 @@ bool SqliteStore::rebake_lost_chunks(const Claim& claim) {
   }
   writer.commit();
   return true;
-}
-
-void SqliteStore::commit_result(const Claim& claim, const std::vector<NewArtifact>& artifacts,
-                                const std::string& accuracy_json) {
-  if (claim.type != TaskType::assemble) return;
-  // Side by side, because each waits for the disk and the disk serves many waits at once.
-  std::vector<std::string> digests(artifacts.size());
-  Progress unwatched;
-  parallel_blocks(artifacts.size(), 1, kWritingThreads, unwatched, [&](size_t begin, size_t) {
-    digests[begin] = blobs_.put(artifacts[begin].bytes);
-  });
-  Writer writer(*this);
-  Database& db = writer.db();
-  if (!holds(db, claim)) {
-    remove_orphans(db, digests);
-    return;
-  }
-  for (size_t i = 0; i < artifacts.size(); ++i) {
-    const NewArtifact& artifact = artifacts[i];
-    if (!blobs_.has(digests[i])) blobs_.put(artifact.bytes);
-    db.run("INSERT INTO artifacts VALUES(?1,?2,?3,?4,?5,?6,?7)", claim.job_id, i, artifact.name,
-           artifact.role, artifact.media_type, digests[i], artifact.bytes.size());
-    add_event(db, claim.job_id, "artifact",
-              EventJson()
-                  .text("name", artifact.name)
-                  .text("role", artifact.role)
-                  .text("media_type", artifact.media_type)
-                  .text("digest", digests[i])
-                  .count("bytes", artifact.bytes.size())
-                  .take());
-  }
-  db.run("UPDATE documents SET accuracy_json=?2 WHERE job_id=?1", claim.job_id, accuracy_json);
-  db.run("UPDATE tasks SET state=2, lease=0, worker='' WHERE job_id=?1 AND type=?2", claim.job_id,
-         kAssemble);
-  move_job(db, claim.job_id, JobEvent::result_committed, "");
-  std::vector<std::string> orphans;
-  drop_chunk_bytes(db, claim.job_id, &orphans);
-  writer.commit();
-  remove_orphans(db, orphans);
 }
 
 // --- bad ends ------------------------------------------------------------------------------------

@@ -7,7 +7,6 @@
 // and every checkpoint holds an flock, so the WAL is never reset under a second writer. All calls
 // are thread-safe; public functions lock, private twins assume the lock.
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -16,139 +15,17 @@
 #include <string>
 #include <vector>
 
-#include "core/base/error.h"
+#include "server/store/records.h"
+#include "server/store/refusal.h"
 
 namespace lightkiln {
-
-// queued -> running -> succeeded | failed | cancelled; queued -> cancelled. Terminal states never
-// change, except that retry() makes a NEW attempt of a failed or cancelled job (back to queued).
-enum class JobState { queued, running, succeeded, failed, cancelled };
-enum class JobStage { plan, bake, assemble, done };
-const char* job_state_name(JobState state);
-const char* job_stage_name(JobStage stage);
-bool is_terminal(JobState state);
-
-struct JobError {
-  std::string code;     // error_code_name, or "oven_crashed"
-  std::string detail;   // one sentence for the client
-  std::string pointer;  // into the input, or ""
-};
-
-struct JobRecord {
-  std::string id;  // sortable by time of submission, 26 characters
-  std::string name;
-  std::string kind;
-  std::string spec_json;    // canonical, fully defaulted
-  std::string spec_digest;  // "sha256:..." of spec_json and the engine version
-  std::map<std::string, std::string> labels;
-  int priority = 0;        // larger is sooner
-  bool plan_only = false;  // succeeds as soon as its plan is committed; bakes nothing
-  JobState state = JobState::queued;
-  JobStage stage = JobStage::plan;
-  std::string
-      reason;  // why it is not running or not done: one sentence, always filled while waiting
-  uint64_t chunks_total = 0;
-  uint64_t chunks_done = 0;
-  double chunk_fraction = 0;  // of the chunk in hand, 0..1
-  double current_error = 0;   // rms half-width over finished chunks; 0 = none yet
-  double target_error = 0;
-  double predicted_s = 0;
-  bool from_cache = false;  // answered from an earlier job's artifacts
-  int attempts = 0;         // tries that ended in a crash or an error
-  std::optional<JobError> error;
-  std::string plan_json;                                    // "" until planned
-  std::string accuracy_json;                                // "" until finished
-  int64_t created_ms = 0, started_ms = 0, finished_ms = 0;  // Unix time, display only; 0 = not yet
-  uint64_t version = 0;  // rises with every visible change; the ETag
-};
-
-struct ArtifactRecord {
-  std::string name, role, media_type, digest;
-  uint64_t bytes = 0;
-};
-
-struct EventRecord {
-  uint64_t sequence = 0;  // strictly rising over the whole store
-  std::string job_id;
-  std::string type;  // "state", "plan", "chunk", "progress", "artifact", "log"
-  std::string json;  // payload object
-  int64_t time_ms = 0;
-};
-
-struct Submission {
-  std::string name, kind, spec_json, spec_digest;
-  std::map<std::string, std::string> labels;
-  std::vector<std::string>
-      inputs;  // digests; all must be present: Error{not_found} names the missing
-  int priority = 0;
-  bool plan_only = false;
-  double target_error = 0;
-  std::string idempotency_key;  // "" = none
-  std::string request_digest;   // of the whole request body, compared under an equal key
-};
-struct SubmitResult {
-  std::string job_id;
-  // An equal key and body was seen before. A job whose artifacts are no longer all there is not
-  // answered with: the order is taken anew under the same key.
-  bool replayed = false;
-};
-
-struct JobFilter {
-  std::optional<JobState> state;
-  std::string kind, text;  // "" = any; text matches id or name
-  std::optional<std::pair<std::string, std::string>> label;
-  std::string after;  // id of the last job of the page before; newest first
-  int limit = 50;     // 1..500
-};
-
-enum class TaskType { plan, chunk, assemble };
-struct Claim {
-  std::string job_id;
-  std::string spec_json;
-  std::string plan_json;  // "" for TaskType::plan
-  TaskType type = TaskType::plan;
-  uint64_t chunk_index = 0;
-  uint64_t lease = 0;  // fencing token: every commit with another one changes nothing
-};
-
-struct ChunkCommit {
-  std::vector<std::byte> bytes;
-  std::string report_json;  // ChunkReport
-  // The report's last round, from which the job's current_error is summed.
-  uint64_t elements = 0;
-  double error_sum_sq = 0;
-};
-
-struct StoredChunk {
-  std::vector<std::byte> bytes;
-  std::string report_json;
-};
-
-struct NewArtifact {
-  std::string name, role, media_type;
-  std::vector<std::byte> bytes;
-};
-
-// A worker that is not known to have ended.
-struct WorkerRecord {
-  std::string name;
-  std::vector<std::string> missing_layers;  // of its ovens' sandbox
-};
-
-struct StoreHealth {
-  bool writable = false;
-  std::string detail;  // what is wrong, "" when nothing
-  uint64_t free_bytes = 0;
-  uint64_t queued = 0, running = 0;
-  uint64_t overdue = 0;  // leases expired for more than 30 s: nobody is rescuing them
-};
 
 struct StoreOptions {
   std::string directory;
   int64_t lease_ms = 15000;
   int max_attempts = 2;                   // tries of one task before the job fails
-  uint64_t min_free_bytes = 64ull << 20;  // below: uploads and submissions answer `unavailable`
-  uint64_t max_queued = 10000;
+  uint64_t min_free_bytes = 64ull << 20;  // below: StoreRefusal{kStorageFull}
+  uint64_t max_queued = 10000;            // above: StoreRefusal{kQueueFull}
 };
 
 class Store {
@@ -169,6 +46,9 @@ class Store {
   // Stores bytes and returns their digest.
   virtual std::string put_blob(const std::vector<std::byte>& bytes) = 0;
   virtual bool has_blob(const std::string& digest) = 0;
+  // Those that are not there. The others count as used now, so that collect_unused() leaves them to
+  // the client that was told not to send them.
+  virtual std::vector<std::string> missing_blobs(const std::vector<std::string>& digests) = 0;
   // Opens a blob read-only and returns the descriptor (the caller closes it). Error{not_found}. The
   // first open in this process verifies the hash; a mismatch quarantines the blob: Error{internal}.
   virtual int open_blob(const std::string& digest, uint64_t* size) = 0;
@@ -176,7 +56,7 @@ class Store {
   // --- jobs, for clients -------------------------------------------------------------------------
   virtual SubmitResult submit(const Submission& submission) = 0;
   virtual std::optional<JobRecord> find_job(const std::string& id) = 0;
-  // Without plan_json and accuracy_json, which can be large.
+  // Without spec_json, plan_json and accuracy_json, which can be large.
   virtual std::vector<JobRecord> list_jobs(const JobFilter& filter) = 0;
   virtual uint64_t
   list_version() = 0;  // rises with every visible change of any job: the list's ETag
@@ -205,16 +85,23 @@ class Store {
   virtual void commit_plan(const Claim& claim, const std::string& plan_json, uint64_t chunks,
                            double predicted_s) = 0;
   virtual void commit_chunk(const Claim& claim, const ChunkCommit& chunk) = 0;
-  // All, by index. Bytes that no longer match their digest are set aside: Error{internal}; bytes
-  // that are absent: Error{not_found}.
-  virtual std::vector<StoredChunk> load_chunks(const std::string& job_id) = 0;
+  // Gives all, by index, one at a time. Bytes that no longer match their digest are set aside:
+  // Error{internal}; bytes that are absent: Error{not_found}.
+  virtual void load_chunks(const std::string& job_id,
+                           const std::function<void(StoredChunk)>& take) = 0;
   // For the claim of an assembly whose chunks did not load: those without bytes wait to be baked
   // again, and the job returns to that stage. A chunk lost once too often fails the job. False when
   // every chunk has its bytes or the lease is lost: nothing was changed.
   virtual bool rebake_lost_chunks(const Claim& claim) = 0;
-  // Artifacts become visible and the job succeeds in one transaction.
-  virtual void commit_result(const Claim& claim, const std::vector<NewArtifact>& artifacts,
-                             const std::string& accuracy_json) = 0;
+  // What an assembly makes. Artifacts are written as they are added, and held only until then.
+  class Result {
+   public:
+    virtual ~Result() = default;  // forgets what was added and not committed
+    virtual void add(NewArtifact artifact) = 0;
+    // Artifacts become visible and the job succeeds in one transaction.
+    virtual void commit(const std::string& accuracy_json) = 0;
+  };
+  virtual std::unique_ptr<Result> begin_result(const Claim& claim) = 0;
   // A task that ended badly. `crashed` (signal, memory, time) is tried again until max_attempts;
   // anything else fails the job at once.
   virtual void fail_task(const Claim& claim, const JobError& error, bool crashed) = 0;
@@ -224,9 +111,14 @@ class Store {
   // Blocks until there may be work or `wait_ms` passed. Wakes across processes.
   virtual void wait_for_work(int64_t wait_ms) = 0;
 
+  // Removes blobs that no job refers to and that nobody sent, asked for or ordered with for
+  // `unused_ms` of wall time (>= 0). Uploads under way are no blobs yet. It may be killed at any
+  // moment; the next call goes on. `stop`, asked between files, ends it early; may be empty.
+  virtual Collected collect_unused(int64_t unused_ms, const std::function<bool()>& stop) = 0;
+
   virtual StoreHealth health() = 0;
   virtual std::vector<WorkerRecord> workers() = 0;  // by name
-  // Counters for /metrics: jobs by (kind, state) and totals.
+  // Numbers for /metrics: jobs by "kind/state", gauges, and counters whose names end in "_total".
   virtual std::map<std::string, uint64_t> counts() = 0;
 };
 

@@ -148,13 +148,14 @@ ChunkCommit feed_chunk(OvenProcess& oven, uint64_t index, const OnProgress& on_p
   return commit;
 }
 
-ResultAnswer feed_assembly(OvenProcess& oven, const std::vector<StoredChunk>& chunks,
-                           const OnProgress& on_progress) {
-  for (const StoredChunk& chunk : chunks)
-    oven.channel().send(FrameType::stored_chunk,
-                        PayloadWriter().bytes(chunk.bytes).text(chunk.report_json).take());
+void feed_stored_chunk(OvenProcess& oven, const StoredChunk& chunk) {
+  oven.channel().send(FrameType::stored_chunk,
+                      PayloadWriter().bytes(chunk.bytes).text(chunk.report_json).take());
+}
+
+std::string feed_assembly(OvenProcess& oven, const std::function<void(NewArtifact)>& take,
+                          const OnProgress& on_progress) {
   oven.channel().send(FrameType::assemble, {});
-  ResultAnswer answer;
   std::set<std::string> names;
   for (;;) {
     Frame frame = *oven.channel().receive(-1);
@@ -172,11 +173,13 @@ ResultAnswer feed_assembly(OvenProcess& oven, const std::vector<StoredChunk>& ch
       if (!is_good_name(artifact.name) || !names.insert(artifact.name).second ||
           names.size() > kMaxArtifacts)
         refuse("The oven gave an artifact a name that is not allowed or not unique.");
-      answer.artifacts.push_back(std::move(artifact));
+      frame.payload.clear();
+      frame.payload.shrink_to_fit();
+      take(std::move(artifact));
     } else if (frame.type == FrameType::result) {
-      answer.accuracy_json = reader.text();
+      std::string accuracy_json(reader.text());
       reader.end();
-      return answer;
+      return accuracy_json;
     } else {
       refuse("The oven answered out of turn.");
     }

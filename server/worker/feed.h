@@ -16,11 +16,6 @@ struct PlanAnswer {
   uint64_t chunks = 0;
   double predicted_s = 0;
 };
-struct ResultAnswer {
-  std::vector<NewArtifact> artifacts;
-  std::string accuracy_json;
-};
-
 // What an oven reported as the end of its job. `crashed` kinds are worth another try.
 struct OvenFailure {
   JobError error;
@@ -43,7 +38,9 @@ void feed_job(OvenProcess& oven, Store& store, const Claim& claim, const FeedOpt
 PlanAnswer feed_plan(OvenProcess& oven, const OnProgress& on_progress);
 void feed_known_plan(OvenProcess& oven, const std::string& plan_json);
 ChunkCommit feed_chunk(OvenProcess& oven, uint64_t index, const OnProgress& on_progress);
-ResultAnswer feed_assembly(OvenProcess& oven, const std::vector<StoredChunk>& chunks,
-                           const OnProgress& on_progress);
+void feed_stored_chunk(OvenProcess& oven, const StoredChunk& chunk);  // in order, before assembly
+// Gives each artifact to `take` as it comes; returns the accuracy record.
+std::string feed_assembly(OvenProcess& oven, const std::function<void(NewArtifact)>& take,
+                          const OnProgress& on_progress);
 
 }  // namespace lightkiln

@@ -22,8 +22,6 @@ namespace lightkiln {
 namespace {
 
 constexpr int kOvenSocket = 3;
-// Address space is not memory: code, thread stacks and malloc's reserves take their share of it.
-constexpr uint64_t kAddressSpaceBesides = 2ull << 30;
 
 // How often the kernel has killed a process for want of memory since it started.
 uint64_t oom_kills() {
@@ -87,8 +85,8 @@ OvenProcess::OvenProcess(const OvenOptions& options, std::function<bool()> inter
   posix_spawn_file_actions_adddup2(actions.get(), theirs.get(), kOvenSocket);
   SpawnAttributes attributes;
 
-  std::string memory =
-      std::to_string(options.memory_bytes > 0 ? options.memory_bytes + kAddressSpaceBesides : 0);
+  std::string memory = std::to_string(
+      options.memory_bytes > 0 ? options.memory_bytes + options.address_space_besides : 0);
   std::string program = options.path;
   char* arguments[] = {program.data(), memory.data(), nullptr};
   // What the worker's environment holds is no business of a program that opens clients' files.

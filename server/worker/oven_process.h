@@ -17,6 +17,8 @@ namespace lightkiln {
 struct OvenOptions {
   std::string path;
   uint64_t memory_bytes = 0;  // a job's; 0 = no limit
+  // Address space is not memory: code, thread stacks and malloc's reserves take their share of it.
+  uint64_t address_space_besides = 2ull << 30;
 };
 
 // How an oven ended. `code` is "oven_crashed" or "out_of_memory".
@@ -27,8 +29,9 @@ struct OvenDeath {
 
 class OvenProcess {
  public:
-  // Starts the program with an empty environment; the kernel kills it when the calling thread ends. `interrupted` is asked
-  // while waiting for it. Throws Error{unavailable} when it cannot be started.
+  // Starts the program with an empty environment; the kernel kills it when the calling thread ends.
+  // `interrupted` is asked while waiting for it. Throws Error{unavailable} when it cannot be
+  // started.
   OvenProcess(const OvenOptions& options, std::function<bool()> interrupted);
   // Kills and reaps it.
   ~OvenProcess();

@@ -177,24 +177,30 @@ class Worker {
         store_->commit_chunk(claim, feed_chunk(oven, claim.chunk_index, on_progress()));
         return;
       case TaskType::assemble: {
-        const auto chunks = chunks_of(claim);
-        if (!chunks) return;
-        const ResultAnswer answer = feed_assembly(oven, *chunks, on_progress());
-        store_->commit_result(claim, answer.artifacts, answer.accuracy_json);
+        if (!give_chunks(oven, claim)) return;
+        const auto result = store_->begin_result(claim);
+        const auto take = [&](NewArtifact artifact) { result->add(std::move(artifact)); };
+        result->commit(feed_assembly(oven, take, on_progress()));
         end_oven();
         return;
       }
     }
   }
 
-  // Nothing when some of them were damaged and wait to be baked again.
-  std::optional<std::vector<StoredChunk>> chunks_of(const Claim& claim) {
+  // False when some of them were damaged and wait to be baked again; the oven has a part of them
+  // then and is of no more use.
+  bool give_chunks(OvenProcess& oven, const Claim& claim) {
     try {
-      return store_->load_chunks(claim.job_id);
+      store_->load_chunks(claim.job_id,
+                          [&](const StoredChunk& chunk) { feed_stored_chunk(oven, chunk); });
+      return true;
     } catch (const Error& error) {
-      if (error.code() == ErrorCode::unavailable || !store_->rebake_lost_chunks(claim)) throw;
+      const bool damaged =
+          error.code() == ErrorCode::internal || error.code() == ErrorCode::not_found;
+      if (!damaged || !store_->rebake_lost_chunks(claim)) throw;
       std::fprintf(stderr, "worker: %s\n", error.what());
-      return std::nullopt;
+      end_oven();
+      return false;
     }
   }
 

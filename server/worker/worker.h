@@ -1,7 +1,8 @@
 #pragma once
 
 // A worker: claims tasks under a lease, hands them to its oven, keeps the lease alive, commits what
-// comes back. It opens no client's file itself.
+// comes back. It opens no client's file itself, and of a job's chunks and artifacts it holds one at
+// a time and up to 64 MiB that wait to be written.
 
 #include <atomic>
 #include <cstdint>

@@ -203,6 +203,22 @@ TEST(Supervision, AWorkerThatDoesNotStopIsKilled) {
   EXPECT_FALSE(alive(starts(folder)[0]));
 }
 
+TEST(DaemonObject, RemovesUploadsThatNobodyUses) {
+  const TemporaryFolder folder;
+  ServeConfig config = quiet(folder);
+  config.keep_unused_days = 0.3 / (24 * 3600);
+  Daemon daemon(config);
+  StoreOptions kept;
+  kept.directory = config.store_directory;
+  const std::unique_ptr<Store> store = open_sqlite_store(kept);
+  const std::string digest = store->put_blob(std::vector<std::byte>(100));
+  EXPECT_TRUE(soon([&] { return !store->has_blob(digest); }));
+  EXPECT_TRUE(soon([&] {
+    return get(daemon.port(), "/metrics").body.find("lightkiln_collected_blobs_total 1\n") !=
+           std::string::npos;
+  }));
+}
+
 // --- the process
 // ----------------------------------------------------------------------------------
 

@@ -15,7 +15,8 @@ namespace lightkiln::test {
 namespace {
 
 TEST(Problems, EveryProblemOfTheHttpLayerCanBeRaised) {
-  std::set<std::string> raised = {"malformed_json"};  // by problem_from_faults
+  std::set<std::string> raised = {"malformed_json",           // by problem_from_faults
+                                  kStorageFull, kQueueFull};  // by the store
   for (int i = 0; i <= static_cast<int>(ErrorCode::internal); ++i)
     raised.insert(error_code_name(static_cast<ErrorCode>(i)));
   for (int status = 400; status < 600; ++status) raised.insert(http_problem_code(status));
@@ -36,6 +37,29 @@ TEST(Health, AServiceWhoseDiskIsFullIsNotReadyAndSaysSo) {
   EXPECT_EQ(get(service.port, "/livez").status, 200);
   EXPECT_NE(get(service.port, "/metrics").body.find("lightkiln_store_writable 0\n"),
             std::string::npos);
+}
+
+TEST(Health, AFullDiskAndAFullQueueAreToldApart) {
+  const auto expect_refusal = [](const RawReply& reply, int status, const char* code,
+                                 const char* retry_after_s) {
+    EXPECT_EQ(reply.status, status);
+    EXPECT_EQ(reply.header("retry-after"), retry_after_s);
+    const Problem problem = read_problem(reply.body);
+    EXPECT_EQ(problem.code, code);
+    EXPECT_TRUE(problem.retryable);
+  };
+  StoreOptions small;
+  small.max_queued = 1;
+  Service queue(Service::roomy(), {}, small);
+  queue.submit();
+  const std::string order = Service::order(queue.upload("scene"));
+  expect_refusal(post(queue.port, "/v1/jobs", order), 429, "queue_full", "10");
+
+  StoreOptions full;
+  full.min_free_bytes = UINT64_MAX;
+  Service disk(Service::roomy(), {}, full);
+  const std::string digest = sha256_digest("x", 1);
+  expect_refusal(request(disk.port, "PUT", "/v1/blobs/" + digest, "x"), 507, "storage_full", "60");
 }
 
 TEST(Health, WorkersAndWhatTheirSandboxesLackCanBeSeen) {

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "tests/http/raw_client.h"
+#include "tests/store/whole.h"
 
 namespace lightkiln::test {
 
@@ -89,10 +90,10 @@ void Service::work() {
       report.rounds = {round};
       store->commit_chunk(*claim, {to_bytes("chunk"), write_chunk_report(report)});
     } else {
-      store->commit_result(*claim,
-                           {{"ao.exr", "image", "image/x-exr", to_bytes(artifact_bytes())},
-                            {"view.png", "preview", "image/png", to_bytes("not really a png")}},
-                           write_accuracy({}));
+      commit_result(*store, *claim,
+                    {{"ao.exr", "image", "image/x-exr", to_bytes(artifact_bytes())},
+                     {"view.png", "preview", "image/png", to_bytes("not really a png")}},
+                    write_accuracy({}));
     }
   }
 }

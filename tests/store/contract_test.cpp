@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "server/store/store.h"
+#include "tests/store/whole.h"
 #include "tests/support/data.h"
 
 namespace lightkiln {
@@ -59,10 +60,10 @@ class StoreContract : public testing::Test {
                         {bytes_of(bytes), "{\"report\":\"" + bytes + "\"}", 4, error_sum_sq});
   }
   void result(const Claim& claim) {
-    store->commit_result(claim,
-                         {{"ao.glb", "glb", "model/gltf-binary", bytes_of("the glb")},
-                          {"ao.exr", "image", "image/x-exr", bytes_of("the exr")}},
-                         R"({"accuracy":1})");
+    test::commit_result(*store, claim,
+                        {{"ao.glb", "glb", "model/gltf-binary", bytes_of("the glb")},
+                         {"ao.exr", "image", "image/x-exr", bytes_of("the exr")}},
+                        R"({"accuracy":1})");
   }
   void bake_to_the_end(uint64_t chunks = 2) {
     plan(chunks);
@@ -119,7 +120,7 @@ TEST_F(StoreContract, AnOrderGoesFromSubmissionToArtifacts) {
 
   const Claim assembling = take();
   EXPECT_EQ(assembling.type, TaskType::assemble);
-  const std::vector<StoredChunk> chunks = store->load_chunks(id);
+  const std::vector<StoredChunk> chunks = test::load_chunks(*store, id);
   ASSERT_EQ(chunks.size(), 2u);
   EXPECT_EQ(chunks[0].bytes, bytes_of("first"));
   EXPECT_EQ(chunks[1].bytes, bytes_of("second"));
@@ -306,7 +307,7 @@ TEST_F(StoreContract, RetryBakesAChunkAgainWhoseBytesWereLost) {
   chunk(take(), "zero");
   const Claim assembling = take();
   damage_every_blob();
-  EXPECT_EQ(code_of([&] { store->load_chunks(id); }), ErrorCode::internal);
+  EXPECT_EQ(code_of([&] { test::load_chunks(*store, id); }), ErrorCode::internal);
   store->fail_task(assembling, {"internal", "No.", ""}, false);
   store->retry(id);
   const Claim again = take();
@@ -324,7 +325,7 @@ TEST_F(StoreContract, AssemblingSendsADamagedChunkBackToBaking) {
   const Claim assembling = take();
   EXPECT_FALSE(store->rebake_lost_chunks(assembling)) << "nothing is lost yet";
   damage_every_blob();
-  EXPECT_EQ(code_of([&] { store->load_chunks(id); }), ErrorCode::internal);
+  EXPECT_EQ(code_of([&] { test::load_chunks(*store, id); }), ErrorCode::internal);
   Claim stale = assembling;
   ++stale.lease;
   EXPECT_FALSE(store->rebake_lost_chunks(stale));
@@ -336,11 +337,11 @@ TEST_F(StoreContract, AssemblingSendsADamagedChunkBackToBaking) {
   EXPECT_EQ(again.type, TaskType::chunk);
   EXPECT_EQ(again.chunk_index, 0u);
   chunk(again, "zero");
-  EXPECT_EQ(code_of([&] { store->load_chunks(id); }), ErrorCode::internal);
+  EXPECT_EQ(code_of([&] { test::load_chunks(*store, id); }), ErrorCode::internal);
   EXPECT_TRUE(store->rebake_lost_chunks(take()));
   chunk(take(), "one");
   const Claim whole = take();
-  EXPECT_EQ(store->load_chunks(id).size(), 2u);
+  EXPECT_EQ(test::load_chunks(*store, id).size(), 2u);
   result(whole);
   EXPECT_EQ(job(id).state, JobState::succeeded);
 }
@@ -352,7 +353,7 @@ TEST_F(StoreContract, AChunkDamagedAgainAndAgainFailsTheJob) {
     chunk(take(), "zero");
     const Claim assembling = take();
     damage_every_blob();
-    EXPECT_EQ(code_of([&] { store->load_chunks(id); }), ErrorCode::internal);
+    EXPECT_EQ(code_of([&] { test::load_chunks(*store, id); }), ErrorCode::internal);
     EXPECT_TRUE(store->rebake_lost_chunks(assembling));
   }
   EXPECT_EQ(job(id).state, JobState::failed);
@@ -544,12 +545,42 @@ TEST_F(StoreContract, AFullQueueAndAFullDiskSayTryAgain) {
   options.max_queued = 1;
   store = open_sqlite_store(options);
   submit("one");
-  EXPECT_EQ(code_of([&] { submit("two"); }), ErrorCode::unavailable);
+  const auto refusal = [](const auto& attempt) -> std::string {
+    try {
+      attempt();
+    } catch (const StoreRefusal& error) {
+      EXPECT_EQ(error.code(), ErrorCode::unavailable);
+      return error.problem_code();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal([&] { submit("two"); }), kQueueFull);
   options.min_free_bytes = uint64_t{1} << 62;
   store = open_sqlite_store(options);
-  EXPECT_EQ(code_of([&] { submit("three"); }), ErrorCode::unavailable);
-  EXPECT_EQ(code_of([&] { store->put_blob({}); }), ErrorCode::unavailable);
+  EXPECT_EQ(refusal([&] { submit("three"); }), kStorageFull);
+  EXPECT_EQ(refusal([&] { store->put_blob({}); }), kStorageFull);
   EXPECT_FALSE(store->health().writable);
+}
+
+TEST_F(StoreContract, AResultThatIsNotCommittedLeavesNothing) {
+  const std::string id = submit();
+  plan(1);
+  chunk(take(), "chunk");
+  const Claim assembling = take();
+  const size_t before = blob_files();
+  {
+    const auto result = store->begin_result(assembling);
+    result->add({"large", "image", "x/y", std::vector<std::byte>(65u << 20)});
+    EXPECT_EQ(blob_files(), before + 1) << "a large artifact is not held until the end";
+    EXPECT_TRUE(store->artifacts(id).empty());
+  }
+  EXPECT_EQ(blob_files(), before);
+  const auto late = store->begin_result(assembling);
+  late->add({"small", "image", "x/y", bytes_of("small")});
+  store->cancel(id);
+  late->commit("{}");
+  EXPECT_EQ(job(id).state, JobState::cancelled);
+  EXPECT_TRUE(store->artifacts(id).empty());
 }
 
 TEST_F(StoreContract, ThreadsShareOneStore) {

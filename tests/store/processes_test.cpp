@@ -14,6 +14,7 @@
 #include "server/store/process_identity.h"
 #include "server/store/storage_failure.h"
 #include "server/store/store.h"
+#include "tests/store/whole.h"
 #include "tests/support/data.h"
 
 namespace lightkiln {
@@ -138,8 +139,9 @@ TEST_F(StoreProcesses, ManyProcessesShareTheWorkWithoutDoingAnyTwice) {
           const auto* data = reinterpret_cast<const std::byte*>(text.data());
           store->commit_chunk(*claim, {{data, data + text.size()}, "{}", 1, 0.01});
         } else {
-          EXPECT_EQ(store->load_chunks(claim->job_id).size(), static_cast<size_t>(kChunks));
-          store->commit_result(*claim, {{"a", "image", "image/x-exr", {std::byte{1}}}}, "{}");
+          EXPECT_EQ(test::load_chunks(*store, claim->job_id).size(), static_cast<size_t>(kChunks));
+          test::commit_result(*store, *claim, {{"a", "image", "image/x-exr", {std::byte{1}}}},
+                              "{}");
         }
       }
     }));

@@ -73,7 +73,10 @@ TEST_F(FakeOven, NumbersThatAreNoneAreRefusedByName) {
   };
   const auto plan = [&](OvenProcess& oven) { feed_plan(oven, ignore); };
   const auto chunk = [&](OvenProcess& oven) { feed_chunk(oven, 0, ignore); };
-  const auto assemble = [&](OvenProcess& oven) { feed_assembly(oven, {}, ignore); };
+  const auto assemble = [&](OvenProcess& oven) {
+    feed_assembly(
+        oven, [](NewArtifact) {}, ignore);
+  };
   const std::string ended = frame(FrameType::result, PayloadWriter().text("{}").take());
 
   EXPECT_EQ(fault(progress(0.5) + planned(2), plan), "");
