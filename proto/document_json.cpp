@@ -1,6 +1,7 @@
 // The document of a result: what the images and tables beside it mean, in numbers and words that an
 // importer can check itself against.
 
+#include "proto/harmonics_json.h"
 #include "proto/json.h"
 #include "proto/json_writer.h"
 
@@ -40,6 +41,8 @@ void write_radiance_convention(JsonWriter& writer) {
   writer.end_object();
 }
 
+}  // namespace
+
 void write_measured(JsonWriter& writer, const MeasuredError& measured) {
   writer.key("measured_error")
       .begin_object()
@@ -48,6 +51,8 @@ void write_measured(JsonWriter& writer, const MeasuredError& measured) {
       .member("max", measured.max)
       .end_object();
 }
+
+namespace {
 
 // `measured` null: the coefficients have an error bar instead.
 void write_sh(JsonWriter& writer, const ShDocument& document,
@@ -139,6 +144,7 @@ void write_environment(JsonWriter& writer, const EnvironmentDocument& document) 
     write_sh(writer, *document.sh, &document.sh_measured);
   else
     writer.null();
+  write_harmonics(writer, document);
   writer.key("irradiance");
   if (document.irradiance)
     write_map(writer, *document.irradiance, [&] { writer.member("quantity", "irradiance"); });

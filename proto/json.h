@@ -32,6 +32,10 @@ Plan read_plan(std::string_view json);     // of our own writing; Error{internal
 std::string write_chunk_report(const ChunkReport& report);
 ChunkReport read_chunk_report(std::string_view json);
 std::string write_accuracy(const AccuracyRecord& record);  // accuracy.json
+// Files in the formats of other programs, which core leaves to this floor: one for each ordered
+// export of coefficients. To be added to the artifacts before the document lists them.
+std::vector<Artifact> write_exports(const Assembly& assembly);
+std::string export_name(ShTarget target);  // "sh_three.json", "sh_filament.txt"
 // "ambient_occlusion.json", "environment_maps.json" or "probes.json": index, statistics,
 // coefficients, the `convention` object and the self-test.
 std::string write_document(const Assembly& assembly, const Spec& spec, const Plan& plan);

@@ -65,7 +65,8 @@ ParameterGroup root_group() {
             "Random streams are a pure function of it: equal specs give equal bytes."}}};
 }
 
-constexpr Range kBands{1, 33};
+constexpr Range kProbeBands{1, 33};
+constexpr Range kMapBands{1, 129};
 constexpr std::string_view kBandsMeaning =
     "Bands of spherical harmonics; bands squared coefficients. Cost grows with their number.";
 
@@ -109,15 +110,56 @@ KindTable ambient_occlusion_table() {
           {root_group(), without(accuracy_group(), {"check_texels"}), own}};
 }
 
+ParameterGroup maps_sh_group() {
+  std::vector<std::string_view> targets;
+  for (const ShTarget target : kShTargets) targets.push_back(sh_target_name(target));
+  return {
+      "/parameters/sh",
+      {{"bands", +[](Spec& s) -> int& { return parameters<Maps>(s).sh->bands; }, kMapBands, false,
+        kBandsMeaning},
+       {"window",
+        NameMember{
+            {"none", "hann", "lanczos", "minimal"},
+            [](const Spec& s) { return static_cast<size_t>(parameters<Maps>(s).sh->window); },
+            [](Spec& s, size_t i) { parameters<Maps>(s).sh->window = ShWindow(i); }},
+        {},
+        false,
+        "Factors by band against ringing. minimal is the smallest filter 1 / (1 + lambda l^2 "
+        "(l+1)^2) whose reconstruction is nowhere negative; what it takes of energy and contrast "
+        "is stated."},
+       {"window_quantity",
+        NameMember{
+            {"radiance", "irradiance"},
+            [](const Spec& s) {
+              return static_cast<size_t>(parameters<Maps>(s).sh->window_quantity);
+            },
+            [](Spec& s, size_t i) { parameters<Maps>(s).sh->window_quantity = ShQuantity(i); }},
+        {},
+        false,
+        "The reconstruction that the window is for and is judged by. radiance asks for more. "
+        "Refused without a window."},
+       {"zh3",
+        +[](Spec& s) -> bool& { return parameters<Maps>(s).sh->zh3; },
+        {},
+        false,
+        "Linear bands with a zonal third band as well (ZH3), fitted and guessed, before any "
+        "window."},
+       {"exports",
+        NameSetMember{std::move(targets),
+                      [](Spec& s) -> uint32_t& { return parameters<Maps>(s).sh->exports; }},
+        {},
+        false,
+        "Files of the first three bands as these engines hold them, with a self-test in the "
+        "engine's axes."}},
+      [](const Spec& s) { return parameters<Maps>(s).sh.has_value(); },
+      [](Spec& s) { parameters<Maps>(s).sh.emplace(); }};
+}
+
 KindTable environment_maps_table() {
   std::vector<ParameterGroup> groups = {without(root_group(), {"seed"}),
                                         without(accuracy_group(), {"max_samples", "max_seconds"}),
                                         {"/parameters", {}}};
-  groups.push_back({"/parameters/sh",
-                    {{"bands", +[](Spec& s) -> int& { return parameters<Maps>(s).sh->bands; },
-                      kBands, false, kBandsMeaning}},
-                    [](const Spec& s) { return parameters<Maps>(s).sh.has_value(); },
-                    [](Spec& s) { parameters<Maps>(s).sh.emplace(); }});
+  groups.push_back(maps_sh_group());
   groups.push_back({"/parameters/irradiance",
                     {{"size",
                       +[](Spec& s) -> int& { return parameters<Maps>(s).irradiance->size; },
@@ -149,6 +191,12 @@ KindTable environment_maps_table() {
                       "Texels a side of the split-sum table."}},
                     [](const Spec& s) { return parameters<Maps>(s).dfg.has_value(); },
                     [](Spec& s) { parameters<Maps>(s).dfg.emplace(); }});
+  groups.push_back(
+      {"/parameters/spectrum",
+       {{"bands", +[](Spec& s) -> int& { return parameters<Maps>(s).spectrum->bands; }, kMapBands,
+         false, "Rows of the spectrum. Cost grows as with as many bands of coefficients."}},
+       [](const Spec& s) { return parameters<Maps>(s).spectrum.has_value(); },
+       [](Spec& s) { parameters<Maps>(s).spectrum.emplace(); }});
   return {
       Kind::environment_maps,
       "Coefficients, irradiance, a GGX-prefiltered chain and the DFG table of a lat-long image.",
@@ -180,7 +228,7 @@ KindTable probes_table() {
                       "Texels along a face's side. Cost grows with its square."}}});
   groups.push_back({"/parameters/sh",
                     {{"bands", +[](Spec& s) -> int& { return parameters<Probes>(s).sh.bands; },
-                      kBands, false, kBandsMeaning}}});
+                      kProbeBands, false, kBandsMeaning}}});
   return {Kind::probes,
           "A radiance cubemap, coefficients, a distance cube and validity at each listed position.",
           {{"scene", &Spec::scene, true}, {"environment", &Spec::environment, false}},

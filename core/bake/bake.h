@@ -23,7 +23,9 @@
 #include "core/bake/plan.h"
 #include "core/base/progress.h"
 #include "core/image/image.h"
+#include "core/sphere/harmonic_spectrum.h"
 #include "core/sphere/harmonics.h"
+#include "core/sphere/zh3.h"
 
 namespace lightkiln {
 
@@ -93,6 +95,13 @@ struct MapDocument {
   double error_bound = 0;  // rms over the sphere, relative to the output's mean; DFG: absolute
   MeasuredError measured;
 };
+struct SpectrumDocument {
+  ShSpectrum spectrum;
+  BandAdvice ordered;              // for the error that was ordered
+  std::vector<BandAdvice> quoted;  // for the errors that every plan prices
+  double error_bound = 0;          // of a coefficient, relative to L00
+  MeasuredError measured;
+};
 struct EnvironmentDocument {
   int source_width = 0, source_height = 0;
   std::string source_format;
@@ -101,6 +110,10 @@ struct EnvironmentDocument {
   double max_luminance = 0;
   std::optional<ShDocument> sh;
   MeasuredError sh_measured;
+  std::optional<ShWindowReport> sh_window;  // of a window other than none
+  std::optional<Zh3> zh3;
+  std::vector<ShExport> sh_exports;
+  std::optional<SpectrumDocument> spectrum;
   std::optional<MapDocument> irradiance;
   std::vector<MapDocument> prefilter;  // levels from the sharpest
   std::optional<MapDocument> dfg;

@@ -10,6 +10,7 @@
 #include "core/base/parallel.h"
 #include "core/base/text.h"
 #include "core/image/decode.h"
+#include "core/sphere/row_spectra.h"
 
 namespace lightkiln {
 
@@ -137,8 +138,10 @@ double model_seconds(MapsLight& light, const MapsOutputs& outputs, int check_tex
   const double width = map.width, height = map.height, bands = bands_of(outputs);
   double seconds = kDecodePerTexel * width * height;
   if (bands > 0) {
-    seconds += kFourierPerPoint * width * height * std::log2(width + 1) +
-               kLegendrePerTerm * height * bands * bands;
+    const double row = bands <= direct_row_orders(map.width)
+                           ? kDirectPerTexel + kDirectPerOrder * bands
+                           : kFourierPerPoint * std::log2(width + 1);
+    seconds += row * width * height + kLegendrePerTerm * height * bands * bands;
   }
   for (const auto& output : outputs) {
     seconds += output->model_seconds(light);

@@ -7,6 +7,8 @@ namespace lightkiln {
 
 inline constexpr double kDecodePerTexel = 4e-9;     // statistics; decoding is the input's own time
 inline constexpr double kFourierPerPoint = 2.7e-9;  // times log2 of the width
+inline constexpr double kDirectPerTexel = 1.1e-9;   // of rows summed directly, and an order more:
+inline constexpr double kDirectPerOrder = 8e-10;
 inline constexpr double kLegendrePerTerm = 3.5e-10;
 inline constexpr double kRingPerTerm = 7e-9;  // bands^3
 inline constexpr double kPerTexel = 4e-8;     // interpolation
@@ -15,6 +17,13 @@ inline constexpr double kPerCorePoint = 4e-9;
 inline constexpr double kResamplePerCell = 1.3e-8;
 inline constexpr double kPerDfgValue = 2.8e-6;
 inline constexpr double kBrutePerTexel = 5e-9;  // of the map, each texel that is checked
+
+inline constexpr double kEnergyPerTexel = 2e-9;
+// Windows look for extremes on grids of 32 points a band squared; `minimal` does so about this
+// often.
+inline constexpr double kWindowSearches = 16;
+inline constexpr double kSearchPerGrid = 1.5e-6;
+inline constexpr double kSearchPerPoint = 2e-6;
 
 // This machine's time over that of the model's core, from a run of under a millisecond.
 double measure_speed();

@@ -9,7 +9,7 @@ namespace lightkiln {
 
 std::span<const MapsProduct> maps_products() {
   static const MapsProduct products[] = {kShProduct, kIrradianceProduct, kPrefilterProduct,
-                                         kDfgProduct};
+                                         kDfgProduct, kSpectrumProduct};
   return products;
 }
 
@@ -40,8 +40,18 @@ void require_spectrum(const MapsOutputs& outputs, MapsLight* light) {
   light->require(sh_bands_of(outputs), lobes_of(outputs));
 }
 
+namespace {
+
+constexpr double kOrderedPerWorking = 10;
+
+}  // namespace
+
 double working_target(double target_error) {
-  return 0.1 * target_error;
+  return target_error / kOrderedPerWorking;
+}
+
+double ordered_error(double working_target) {
+  return working_target * kOrderedPerWorking;
 }
 
 size_t check_index(int i, size_t all) {

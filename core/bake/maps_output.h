@@ -64,6 +64,8 @@ void require_spectrum(const MapsOutputs& outputs, MapsLight* light);
 // The bound that an order of `target_error` is baked to. A bound is an rms over the sphere; a tenth
 // of the order leaves room for the single texel.
 double working_target(double target_error);
+// The order behind it.
+double ordered_error(double working_target);
 
 // The i-th of `count` indices below `all` to hold against a twin: spread evenly at any count, by
 // the golden ratio.
@@ -95,5 +97,6 @@ extern const MapsProduct kShProduct;
 extern const MapsProduct kIrradianceProduct;
 extern const MapsProduct kPrefilterProduct;
 extern const MapsProduct kDfgProduct;
+extern const MapsProduct kSpectrumProduct;
 
 }  // namespace lightkiln

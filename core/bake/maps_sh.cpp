@@ -1,82 +1,144 @@
-// Coefficients of the radiance.
+// Coefficients of the radiance, windowed if ordered, with their smaller and their foreign forms.
 
+#include "core/bake/maps_sh.h"
+
+#include <algorithm>
 #include <cmath>
 
-#include "core/bake/maps_output.h"
+#include "core/bake/maps_cost.h"
 #include "core/environment/brute_force.h"
 
 namespace lightkiln {
 
 namespace {
 
-// Quadrature along rows and rounding, relative to L00.
-constexpr double kShErrorBound = 1e-7;
-
 Vec3d coefficient_of(const LatlongSpectrum& spectrum, int l, int m) {
   const double* at = &spectrum.coefficients[spectrum.offset(l, std::abs(m))] + (m < 0 ? 3 : 0);
   return {at[0], at[1], at[2]};
 }
 
+}  // namespace
+
+// The turn into the world frame is a rotation, which tests hold to 1e-12; what is checked here is
+// the projection.
+MeasuredError check_coefficients(MapsLight& light, int bands, int count, Progress& progress) {
+  if (light.constant()) return {};
+  const LatlongSpectrum& spectrum = light.spectrum(progress);
+  ErrorMeter meter(length(coefficient_of(spectrum, 0, 0)));
+  for (int i = 0; i < count; ++i) {
+    progress.check();
+    const size_t index = check_index(i, sh_coefficient_count(bands));
+    const int l = static_cast<int>(std::sqrt(static_cast<double>(index)));
+    const int m = static_cast<int>(index) - l * l - l;
+    meter.add(coefficient_of(spectrum, l, m), projected_coefficient(light.environment(), l, m));
+  }
+  return meter.result();
+}
+
+ShRgb radiance_coefficients(MapsLight& light, int bands, Progress& progress) {
+  if (!light.constant()) return world_harmonics(light.spectrum(progress), bands);
+  ShRgb sh(bands);
+  sh.coefficients[0] = light.environment().mean * (2 * std::sqrt(kPi));
+  return sh;
+}
+
+namespace {
+
+void write_coefficients(const ShRgb& sh, ByteWriter& writer) {
+  for (const Vec3d& c : sh.coefficients) {
+    for (int channel = 0; channel < 3; ++channel) writer.f64(c[channel]);
+  }
+}
+
+ShRgb read_coefficients(int bands, ByteReader& reader) {
+  ShRgb sh(bands);
+  for (Vec3d& c : sh.coefficients) {
+    for (int channel = 0; channel < 3; ++channel) c[channel] = reader.f64();
+  }
+  return sh;
+}
+
+// One list of members for both directions.
+void visit_report(auto& report, const auto& visit) {
+  visit(report.lambda);
+  for (auto& factor : report.factors) visit(factor);
+  for (auto* extremes : {&report.before, &report.after}) {
+    visit(extremes->lowest);
+    visit(extremes->luminance_min);
+    visit(extremes->luminance_max);
+  }
+  visit(report.proven_lowest);
+  visit(report.energy_removed);
+  visit(report.contrast_removed);
+}
+
 class Coefficients : public MapsOutput {
  public:
-  Coefficients(int bands, bool constant) : bands_(bands), constant_(constant) {}
+  Coefficients(const ShOutput& order, bool constant) : order_(order), constant_(constant) {}
 
   double error_bound() const override { return constant_ ? 0 : kShErrorBound; }
-  SpectrumNeed spectrum_need() const override { return {constant_ ? 0 : bands_, nullptr}; }
-  double model_seconds(MapsLight&) const override { return 0; }
+  SpectrumNeed spectrum_need() const override { return {constant_ ? 0 : projected(), nullptr}; }
+  double model_seconds(MapsLight&) const override {
+    if (constant_ || order_.window == ShWindow::none) return 0;
+    const double searches = order_.window == ShWindow::minimal ? kWindowSearches : 6;
+    const double bands = order_.bands;
+    return searches * (kSearchPerGrid * bands * bands + kSearchPerPoint * bands * bands);
+  }
 
+  // Bytes: the coefficients as ordered, the report of a window, the raw bands of ZH3.
   MeasuredError make(MapsLight& light, int check_texels, ByteWriter& writer,
                      Progress& progress) const override {
-    ShRgb sh(bands_);
-    MeasuredError measured;
-    if (light.constant()) {
-      sh.coefficients[0] = light.environment().mean * (2 * std::sqrt(kPi));
-    } else {
-      sh = world_harmonics(light.spectrum(progress), bands_);
-      measured = check(light, check_texels, progress);
+    const ShRgb raw = radiance_coefficients(light, projected(), progress);
+    ShRgb kept(order_.bands);
+    std::copy_n(raw.coefficients.begin(), kept.coefficients.size(), kept.coefficients.begin());
+    const WindowedSh windowed =
+        window_sh(kept, order_.window, order_.window_quantity, light.threads(), progress);
+    write_coefficients(windowed.sh, writer);
+    if (order_.window != ShWindow::none) {
+      visit_report(windowed.report, [&](double value) { writer.f64(value); });
     }
-    for (const Vec3d& c : sh.coefficients) {
-      for (int channel = 0; channel < 3; ++channel) writer.f64(c[channel]);
-    }
-    return measured;
+    if (order_.zh3) write_coefficients(raw_three(raw), writer);
+    return check_coefficients(light, order_.bands, check_texels, progress);
   }
 
   void file(ByteReader& reader, const MeasuredError& measured, Assembly*,
             EnvironmentDocument* document) const override {
     ShDocument sh;
-    sh.sh = ShRgb(bands_);
-    for (Vec3d& c : sh.sh.coefficients) {
-      for (int channel = 0; channel < 3; ++channel) c[channel] = reader.f64();
-    }
+    sh.sh = read_coefficients(order_.bands, reader);
     sh.selftest = make_selftest(sh.sh);
     sh.error = error_bound();
+    if (order_.window != ShWindow::none) {
+      ShWindowReport report;
+      report.window = order_.window;
+      report.quantity = order_.window_quantity;
+      report.factors.resize(static_cast<size_t>(order_.bands));
+      visit_report(report, [&](double& value) { value = reader.f64(); });
+      document->sh_window = std::move(report);
+    }
+    if (order_.zh3) document->zh3 = make_zh3(read_coefficients(3, reader));
+    for (size_t i = 0; i < std::size(kShTargets); ++i) {
+      if (order_.exports >> i & 1) document->sh_exports.push_back(export_sh(sh.sh, kShTargets[i]));
+    }
     document->sh = std::move(sh);
     document->sh_measured = measured;
   }
 
  private:
-  // The turn into the world frame is a rotation, which tests hold to 1e-12; what is checked here is
-  // the projection.
-  MeasuredError check(MapsLight& light, int count, Progress& progress) const {
-    const LatlongSpectrum& spectrum = light.spectrum(progress);
-    ErrorMeter meter(length(coefficient_of(spectrum, 0, 0)));
-    for (int i = 0; i < count; ++i) {
-      progress.check();
-      const size_t index = check_index(i, sh_coefficient_count(bands_));
-      const int l = static_cast<int>(std::sqrt(static_cast<double>(index)));
-      const int m = static_cast<int>(index) - l * l - l;
-      meter.add(coefficient_of(spectrum, l, m), projected_coefficient(light.environment(), l, m));
-    }
-    return meter.result();
+  int projected() const { return order_.zh3 ? std::max(order_.bands, 3) : order_.bands; }
+
+  static ShRgb raw_three(const ShRgb& raw) {
+    ShRgb three(3);
+    std::copy_n(raw.coefficients.begin(), three.coefficients.size(), three.coefficients.begin());
+    return three;
   }
 
-  int bands_;
+  ShOutput order_;
   bool constant_;
 };
 
 void order_sh(const EnvironmentMapsParameters& parameters, MapsLight& light, double,
               MapsOutputs* outputs) {
-  outputs->push_back(std::make_unique<Coefficients>(parameters.sh->bands, light.constant()));
+  outputs->push_back(std::make_unique<Coefficients>(*parameters.sh, light.constant()));
 }
 
 }  // namespace

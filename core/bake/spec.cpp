@@ -130,11 +130,21 @@ void check_ambient_occlusion(const AmbientOcclusionParameters& p, Checker& check
                   "falloff_distance belongs to the falloff exponential only.");
 }
 
+void check_sh(const ShOutput& sh, Checker& checker) {
+  checker.between(sh.bands, 1, 129, "/parameters/sh/bands", "bands");
+  if (sh.window == ShWindow::none && sh.window_quantity != ShQuantity::irradiance)
+    checker.fault("/parameters/sh/window_quantity", "conflict",
+                  "window_quantity says what a window is for; it needs a window other than none.");
+  if (sh.exports >> std::size(kShTargets) != 0)
+    checker.fault("/parameters/sh/exports", "range", "exports names an engine that is not known.");
+}
+
 void check_environment_maps(const EnvironmentMapsParameters& p, Checker& checker) {
-  if (!p.sh && !p.irradiance && !p.prefilter && !p.dfg)
+  if (!p.sh && !p.irradiance && !p.prefilter && !p.dfg && !p.spectrum)
     checker.fault("/parameters", "missing",
-                  "Order at least one of sh, irradiance, prefilter and dfg.");
-  if (p.sh) checker.between(p.sh->bands, 1, 33, "/parameters/sh/bands", "bands");
+                  "Order at least one of sh, irradiance, prefilter, dfg and spectrum.");
+  if (p.sh) check_sh(*p.sh, checker);
+  if (p.spectrum) checker.between(p.spectrum->bands, 1, 129, "/parameters/spectrum/bands", "bands");
   if (p.irradiance)
     checker.between(p.irradiance->size, 1, 1024, "/parameters/irradiance/size", "size");
   if (p.dfg) checker.between(p.dfg->size, 8, 1024, "/parameters/dfg/size", "size");

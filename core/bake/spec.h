@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "core/base/math.h"
+#include "core/sphere/harmonic_exports.h"
+#include "core/sphere/harmonic_window.h"
 
 namespace lightkiln {
 
@@ -36,7 +38,21 @@ struct AmbientOcclusionParameters {
 
 // Each product is made only when ordered.
 struct ShOutput {
-  int bands = 3;  // 1..33; cost grows with bands^2
+  int bands = 3;  // 1..129; cost grows with bands^2
+  // none leaves the coefficients as projected. `minimal` searches the sphere, up to seconds at 129
+  // bands; hann and lanczos cost nothing.
+  ShWindow window = ShWindow::none;
+  // The reconstruction that the window is for and is judged by. Radiance asks for more. Refused
+  // without a window.
+  ShQuantity window_quantity = ShQuantity::irradiance;
+  // Linear bands with a zonal third one as well, from at least three bands before any window.
+  bool zh3 = false;
+  // Files for other engines, of the first three bands: bit i stands for kShTargets[i].
+  uint32_t exports = 0;
+};
+// Energy by band, what is missing after n bands, and how many bands are enough.
+struct SpectrumOutput {
+  int bands = 33;  // 1..129 rows; cost as of as many bands of SH
 };
 struct IrradianceOutput {
   int size = 64;  // texels a face side, 1..1024; cost grows with size^2
@@ -55,17 +71,22 @@ struct EnvironmentMapsParameters {
   std::optional<IrradianceOutput> irradiance;
   std::optional<PrefilterOutput> prefilter;
   std::optional<DfgOutput> dfg;
-  // At least one of the four is ordered.
+  std::optional<SpectrumOutput> spectrum;
+  // At least one of them is ordered.
 };
 
 struct CubemapOutput {
   int size = 64;  // texels a face side, 1..512; cost grows with size^2
 };
 
+struct ProbeShOutput {
+  int bands = 3;  // 1..33; cost grows with bands^2
+};
+
 struct ProbesParameters {
   std::vector<Vec3d> positions;  // world units, 1..10000 positions
   CubemapOutput cubemap;
-  ShOutput sh;
+  ProbeShOutput sh;
   // Diffuse bounces, 0..64: 0 = only light that surfaces emit or the environment sends directly to
   // the probe. None = the fewest whose truncation bound stays under half the ordered error.
   std::optional<int> max_bounces;

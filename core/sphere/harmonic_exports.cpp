@@ -30,13 +30,17 @@ const std::array<double, 9>& basis_constants() {
 constexpr int kBand[9] = {0, 1, 1, 1, 2, 2, 2, 2, 2};
 constexpr bool kOddOrder[9] = {false, true, false, true, false, true, false, true, false};
 
-// The coefficients of g(d') = f(d), d' = axes * d. A reflection is a proper turn after the point
-// inversion d -> -d, which negates the odd bands.
-std::array<Vec3d, 9> in_axes(const ShRgb& radiance, const std::array<Vec3d, 3>& axes) {
+ShRgb first_three(const ShRgb& radiance) {
   ShRgb three(3);
   std::copy_n(radiance.coefficients.begin(),
               std::min(radiance.coefficients.size(), three.coefficients.size()),
               three.coefficients.begin());
+  return three;
+}
+
+// The coefficients of g(d') = f(d), d' = axes * d. A reflection is a proper turn after the point
+// inversion d -> -d, which negates the odd bands.
+std::array<Vec3d, 9> in_axes(ShRgb three, const std::array<Vec3d, 3>& axes) {
   const bool mirrored = dot(cross(axes[0], axes[1]), axes[2]) < 0;
   double turn[3][3];
   for (int row = 0; row < 3; ++row) {
@@ -126,7 +130,9 @@ std::array<Vec3d, 3> sh_target_axes(ShTarget target) {
 ShExport export_sh(const ShRgb& radiance, ShTarget target) {
   ShExport result;
   result.target = target;
-  result.coefficients = in_axes(radiance, sh_target_axes(target));
+  const ShRgb three = first_three(radiance);
+  const std::array<Vec3d, 3> axes = sh_target_axes(target);
+  result.coefficients = in_axes(three, axes);
   const bool phase = target == ShTarget::unreal || target == ShTarget::babylon ||
                      target == ShTarget::ext_lights_image_based;
   const bool prescaled = target == ShTarget::filament || target == ShTarget::unity;
@@ -141,6 +147,14 @@ ShExport export_sh(const ShRgb& radiance, ShTarget target) {
   }
   if (target == ShTarget::babylon) result.polynomial = babylon_polynomial(result.coefficients);
   if (target == ShTarget::unreal) result.packed = unreal_packed(result.coefficients);
+  // No axis and no mirror plane of the basis among them.
+  const Vec3d directions[] = {{2, 3, 6},   {-6, 2, 3}, {3, -6, 2},
+                              {-2, -3, 6}, {6, 2, -3}, {-3, 6, -2}};
+  for (const Vec3d& direction : directions) {
+    const Vec3d normal = direction / 7;
+    result.selftest.push_back({{dot(axes[0], normal), dot(axes[1], normal), dot(axes[2], normal)},
+                               sh_irradiance(three, normal) / kPi});
+  }
   return result;
 }
 

@@ -43,6 +43,12 @@ struct ShExport {
   std::vector<Vec3d> polynomial;
   // unreal: the seven float4 of SkyIrradianceEnvironmentMap. Others: empty.
   std::vector<std::array<double, 4>> packed;
+  // Six normals in the target's axes with irradiance / pi there, which the engine multiplies by
+  // albedo: for an importer to prove itself.
+  struct Check {
+    Vec3d normal, diffuse;
+  };
+  std::vector<Check> selftest;
 };
 
 // Of radiance coefficients; bands beyond the third are left out, missing ones count as 0.

@@ -185,7 +185,7 @@ std::vector<FieldPoint> grid_minima(const RelativeField& field, const RingGrid& 
 // Steps to the lowest of eight neighbours at a radius that is halved when none is lower.
 FieldPoint descend(Sampler& sampler, FieldPoint start, double radius) {
   FieldPoint best = sampler.lowest(start.direction);
-  for (double r = radius; r > 1e-9 * radius;) {
+  for (double r = radius; r > 1e-5 * radius;) {
     const Basis<double> frame = make_basis(best.direction);
     FieldPoint next = best;
     for (int i = 0; i < 8; ++i) {
@@ -239,10 +239,10 @@ double cell_radius(const Cell& cell, double half_theta, double half_phi) {
 }  // namespace
 
 MinimumBound bound_minimum(const RelativeField& field, std::span<const double> factors,
-                           double known, double tolerance, int threads, Progress& progress) {
+                           double level, double tolerance, int threads, Progress& progress) {
   const double curvature = field.curvature_bound(factors);
-  // Half the tolerance is for values below `known`, half for what living cells may still hide.
-  const double floor = known - 0.5 * tolerance;
+  // Half the tolerance is for values below `level`, half for what living cells may still hide.
+  const double floor = level - 0.5 * tolerance;
   const RingGrid grid = sample_grid(field, factors, threads, progress);
   double half_theta = kPi / (2 * grid.rings()), half_phi = kPi / grid.longitudes();
   const auto excess = [&](const Cell& cell) {

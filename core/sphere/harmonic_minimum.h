@@ -56,23 +56,22 @@ struct FieldPoint {
 
 // The lowest local minima of sum_l factors[l] f_l over sphere and channels, ascending, at most
 // `count`: local minima of a ring grid of eight points a wavelength, refined in double until they
-// move less than 1e-9 of a wavelength. Negate the factors for maxima.
+// move less than 1e-6 of a wavelength. Negate the factors for maxima.
 std::vector<FieldPoint> lowest_points(const RelativeField& field, std::span<const double> factors,
                                       size_t count, int threads, Progress& progress);
 
-// A lower bound of the minimum of sum_l factors[l] f_l, at most `tolerance` under `known`, which
-// must be a value that the function takes. At the minimum the gradient vanishes, so a point at
-// distance d from it lies at most curvature d^2 / 2 above: a cell of radius h whose centre exceeds
-// `known` - `tolerance` by more than curvature h^2 / 2 cannot hold anything lower and is dropped,
-// the others are quartered. When that would take more than about a second, the bound reached by
-// then is returned. `found` receives a point below `known` - `tolerance` if one is met, and the
-// search ends.
+// A proof that sum_l factors[l] f_l is nowhere below `level` - `tolerance`, or a point below
+// `level`
+// - `tolerance` / 2. At the minimum the gradient vanishes, so a point at distance d from it lies at
+// most curvature d^2 / 2 above: a cell of radius h whose centre exceeds `level` by more than
+// curvature h^2 / 2 cannot hold anything lower and is dropped, the others are quartered. When that
+// would take more than about a second, the bound reached by then is returned.
 struct MinimumBound {
   double bound = 0;
   bool refuted = false;
   FieldPoint found;
 };
 MinimumBound bound_minimum(const RelativeField& field, std::span<const double> factors,
-                           double known, double tolerance, int threads, Progress& progress);
+                           double level, double tolerance, int threads, Progress& progress);
 
 }  // namespace lightkiln

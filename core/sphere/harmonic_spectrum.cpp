@@ -58,8 +58,7 @@ double lobe_tail(int first) {
 // A_l on band l, and |A_l| falls with even l (odd bands above 1 vanish). At one direction band l is
 // off by at most A_l sqrt((2l+1) / 4 pi) |c_l| (addition theorem), and everything beyond the known
 // bands by sqrt(lobe_tail) times the length of the unknown coefficients (Cauchy and Schwarz).
-ShSpectrum make_spectrum(std::span<const Vec3d> energy, const Vec3d& total, const Vec3d& mean,
-                         double target_error) {
+ShSpectrum make_spectrum(std::span<const Vec3d> energy, const Vec3d& total, const Vec3d& mean) {
   ShSpectrum spectrum;
   spectrum.total_energy = total;
   spectrum.mean = mean;
@@ -90,10 +89,18 @@ ShSpectrum make_spectrum(std::span<const Vec3d> energy, const Vec3d& total, cons
     irradiance += band * (a * a);
     peak += Vec3d{std::sqrt(band.x), std::sqrt(band.y), std::sqrt(band.z)} *
             (a * std::sqrt((2 * l + 1) / (4 * kPi)));
-    if (row.radiance_rms <= target_error) spectrum.radiance_bands = l + 1;
-    if (row.irradiance_rms <= target_error) spectrum.irradiance_bands = l + 1;
   }
   return spectrum;
+}
+
+BandAdvice advise_bands(const ShSpectrum& spectrum, double error) {
+  BandAdvice advice{error, 0, 0};
+  for (const BandRow& row : spectrum.rows) {
+    if (advice.radiance_bands == 0 && row.radiance_rms <= error) advice.radiance_bands = row.bands;
+    if (advice.irradiance_bands == 0 && row.irradiance_rms <= error)
+      advice.irradiance_bands = row.bands;
+  }
+  return advice;
 }
 
 }  // namespace lightkiln

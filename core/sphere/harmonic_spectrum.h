@@ -30,15 +30,19 @@ struct ShSpectrum {
   Vec3d total_energy;         // of all bands
   Vec3d mean;                 // radiance
   std::vector<BandRow> rows;  // n = 1 .. bands
-  // The fewest bands whose rms error is at most the ordered one; 0 when more than `rows` are
-  // needed.
-  int radiance_bands = 0, irradiance_bands = 0;
 };
 
 // `energy` holds sum_m c_lm^2 of each known band, `total` that of all bands, `mean` the mean
 // radiance. What lies beyond the known bands counts in full for radiance, and for irradiance by the
 // largest cosine factor there. A black map has zero errors.
-ShSpectrum make_spectrum(std::span<const Vec3d> energy, const Vec3d& total, const Vec3d& mean,
-                         double target_error);
+ShSpectrum make_spectrum(std::span<const Vec3d> energy, const Vec3d& total, const Vec3d& mean);
+
+// The fewest bands whose rms error is at most `error`; 0 when more than the spectrum's rows are
+// needed.
+struct BandAdvice {
+  double error = 0;
+  int radiance_bands = 0, irradiance_bands = 0;
+};
+BandAdvice advise_bands(const ShSpectrum& spectrum, double error);
 
 }  // namespace lightkiln

@@ -96,42 +96,56 @@ double smallest_lambda(const std::vector<BandValues>& points, double from) {
 struct MinimalLambda {
   double lambda = 0;
   double proven = 0;
+  std::vector<FieldPoint> met;  // every point that was negative on the way
 };
+
+ShRgb truncated(const ShRgb& sh, int bands) {
+  ShRgb few(bands);
+  std::copy_n(sh.coefficients.begin(), few.coefficients.size(), few.coefficients.begin());
+  return few;
+}
 
 // The exchange method of semi-infinite programming: a lambda must serve infinitely many directions.
 // Keep the few that were ever negative, take the smallest lambda that serves those, look for the
 // lowest points under it, and add them. Every lambda met is a lower bound of the answer; the last
-// one serves the whole sphere.
-MinimalLambda minimal_lambda(const RelativeField& field, std::span<const double> quantity,
-                             int threads, Progress& progress) {
+// one serves the whole sphere. Where few bands are negative many are so nearby: their points are a
+// cheap beginning.
+MinimalLambda minimal_lambda(const ShRgb& sh, ShQuantity quantity, int threads,
+                             Progress& progress) {
   constexpr size_t kPoints = 12;
-  constexpr int kRounds = 100;
+  constexpr int kRounds = 100, kFewBands = 12;
   MinimalLambda result;
+  if (sh.bands > kFewBands) {
+    const ShRgb few = truncated(sh, std::max(kFewBands, sh.bands / 3));
+    result.met = minimal_lambda(few, quantity, threads, progress).met;
+  }
+  const RelativeField field(sh);
+  const std::vector<double> weights = quantity_factors(quantity, sh.bands);
   std::vector<BandValues> points;
-  std::vector<Vec3d> parts(quantity.size());
+  std::vector<Vec3d> parts(weights.size());
   const auto keep = [&](const FieldPoint& point) {
     field.parts().evaluate(point.direction, parts);
     BandValues bands;
     for (size_t l = 0; l < parts.size(); ++l) {
-      bands.push_back(parts[l][point.channel] * quantity[l]);
+      bands.push_back(parts[l][point.channel] * weights[l]);
     }
     points.push_back(std::move(bands));
   };
+  for (const FieldPoint& point : result.met) keep(point);
+  if (!points.empty()) result.lambda = smallest_lambda(points, 0);
   for (int round = 0; round < kRounds; ++round) {
-    const std::vector<double> factors =
-        times(quantity, sloan_factors(static_cast<int>(quantity.size()), result.lambda));
-    const std::vector<FieldPoint> lowest =
-        lowest_points(field, factors, kPoints, threads, progress);
-    const size_t known = points.size();
-    if (lowest.front().value < -kTolerance) {
-      for (const FieldPoint& point : lowest) keep(point);
-    } else {
-      const MinimumBound bound =
-          bound_minimum(field, factors, lowest.front().value, kTolerance, threads, progress);
+    const std::vector<double> factors = times(weights, sloan_factors(sh.bands, result.lambda));
+    std::vector<FieldPoint> lowest = lowest_points(field, factors, kPoints, threads, progress);
+    if (lowest.front().value >= -kTolerance) {
+      const MinimumBound bound = bound_minimum(field, factors, 0, kTolerance, threads, progress);
       result.proven = bound.bound;
-      if (bound.refuted && bound.found.value < -kTolerance) keep(bound.found);
+      if (!bound.refuted || bound.found.value >= -kTolerance) return result;
+      lowest = {bound.found};
     }
-    if (points.size() == known) return result;
+    for (const FieldPoint& point : lowest) {
+      keep(point);
+      result.met.push_back(point);
+    }
     result.lambda = smallest_lambda(points, result.lambda);
   }
   throw Error(ErrorCode::internal, "The search for the smallest window did not end.");
@@ -141,11 +155,11 @@ ShExtremes measure_extremes(const RelativeField& field, const RelativeField& lum
                             std::span<const double> factors, int threads, Progress& progress) {
   const std::vector<double> copy(factors.begin(), factors.end());
   ShExtremes extremes;
-  extremes.lowest = lowest_points(field, copy, 4, threads, progress).front().value;
+  extremes.lowest = lowest_points(field, copy, 2, threads, progress).front().value;
   if (luminance_field.empty()) return extremes;
-  extremes.luminance_min = lowest_points(luminance_field, copy, 4, threads, progress).front().value;
+  extremes.luminance_min = lowest_points(luminance_field, copy, 2, threads, progress).front().value;
   extremes.luminance_max =
-      -lowest_points(luminance_field, negated(copy), 4, threads, progress).front().value;
+      -lowest_points(luminance_field, negated(copy), 2, threads, progress).front().value;
   return extremes;
 }
 
@@ -170,32 +184,35 @@ WindowedSh window_sh(const ShRgb& radiance, ShWindow window, ShQuantity quantity
                      Progress& progress) {
   WindowedSh result;
   result.sh = radiance;
-  result.window = window;
-  result.quantity = quantity;
-  result.factors.assign(static_cast<size_t>(radiance.bands), 1.0);
+  ShWindowReport& report = result.report;
+  report.window = window;
+  report.quantity = quantity;
+  report.factors.assign(static_cast<size_t>(radiance.bands), 1.0);
   if (window == ShWindow::none) return result;
+  if (window == ShWindow::hann) report.factors = hann_factors(radiance.bands);
+  if (window == ShWindow::lanczos) report.factors = lanczos_factors(radiance.bands);
+  const double energy = energy_above_zero(radiance);
+  if (!(energy > 0)) {
+    if (luminance(radiance.coefficients[0]) > 0) report.before = report.after = {1, 1, 1};
+    return result;
+  }
   const RelativeField field(radiance);
-  if (field.empty()) return result;
   const RelativeField grey(luminance_alone(radiance));
   const std::vector<double> weights = quantity_factors(quantity, radiance.bands);
-  if (window == ShWindow::hann) result.factors = hann_factors(radiance.bands);
-  if (window == ShWindow::lanczos) result.factors = lanczos_factors(radiance.bands);
   if (window == ShWindow::minimal) {
-    const MinimalLambda minimal = minimal_lambda(field, weights, threads, progress);
-    result.lambda = minimal.lambda;
-    result.proven_lowest = minimal.proven;
-    result.factors = sloan_factors(radiance.bands, minimal.lambda);
+    const MinimalLambda minimal = minimal_lambda(radiance, quantity, threads, progress);
+    report.lambda = minimal.lambda;
+    report.proven_lowest = minimal.proven;
+    report.factors = sloan_factors(radiance.bands, minimal.lambda);
   }
-  result.sh = sh_convolve(radiance, result.factors);
-  result.before = measure_extremes(field, grey, weights, threads, progress);
-  const std::vector<double> windowed = times(weights, result.factors);
-  result.after = measure_extremes(field, grey, windowed, threads, progress);
-  const double energy = energy_above_zero(radiance);
-  const double contrast = result.before.luminance_max - result.before.luminance_min;
-  if (energy > 0) result.energy_removed = 1 - energy_above_zero(result.sh) / energy;
+  result.sh = sh_convolve(radiance, report.factors);
+  report.before = measure_extremes(field, grey, weights, threads, progress);
+  report.after = measure_extremes(field, grey, times(weights, report.factors), threads, progress);
+  const double contrast = report.before.luminance_max - report.before.luminance_min;
+  report.energy_removed = 1 - energy_above_zero(result.sh) / energy;
   if (contrast > 0) {
-    result.contrast_removed =
-        1 - (result.after.luminance_max - result.after.luminance_min) / contrast;
+    report.contrast_removed =
+        1 - (report.after.luminance_max - report.after.luminance_min) / contrast;
   }
   return result;
 }

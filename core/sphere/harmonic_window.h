@@ -34,12 +34,12 @@ struct ShExtremes {
   double luminance_max = 0;
 };
 
-struct WindowedSh {
-  ShRgb sh;  // radiance coefficients; L00 has the bits it had
+// What a window did.
+struct ShWindowReport {
   ShWindow window = ShWindow::none;
   ShQuantity quantity = ShQuantity::irradiance;  // of `before`, `after` and `minimal`
   double lambda = 0;                             // of `minimal`
-  std::vector<double> factors;
+  std::vector<double> factors;                   // by band
   ShExtremes before, after;
   // The minimum of the result over sphere and channels is proven to be at least this, relative to
   // the channel's mean. Of `minimal` alone; 0 otherwise.
@@ -47,6 +47,10 @@ struct WindowedSh {
   // Share of the energy of bands 1 and up that the window took, over all channels; and share of the
   // luminance's contrast, max - min over the sphere.
   double energy_removed = 0, contrast_removed = 0;
+};
+struct WindowedSh {
+  ShRgb sh;  // radiance coefficients; L00 has the bits it had
+  ShWindowReport report;
 };
 
 // Radiance coefficients, windowed. `none` returns them untouched and searches nothing. `minimal`

@@ -14,13 +14,6 @@ namespace lightkiln {
 
 namespace {
 
-// Up to this many orders direct sums cost less than a transform, measured at width 2048: widths
-// that are not powers of two transform as a convolution of four times the length.
-int direct_orders(int width) {
-  if (width % 4 != 0) return 0;
-  return std::has_single_bit(static_cast<unsigned>(width)) ? 32 : 96;
-}
-
 // Texel k is centred on longitude pi - D (k + 1/2), D = 2 pi / W, so
 //   int f e^{i m phi} dphi = box sum_k f_k e^{i m phi_k},  box = D sinc(m D / 2).
 double box_integral(int m, int width) {
@@ -175,6 +168,13 @@ void sum_row_pairs(const Image& image, int vector_index, const QuarterTable& tab
 
 }  // namespace
 
+// Measured at width 2048; widths that are not powers of two transform as a convolution of four
+// times the length.
+int direct_row_orders(int width) {
+  if (width % 4 != 0) return 0;
+  return std::has_single_bit(static_cast<unsigned>(width)) ? 32 : 96;
+}
+
 RowSpectra row_spectra(const Image& image, int orders, int threads, Progress& progress,
                        RowMethod method) {
   assert(image.channels == 3 && orders >= 1);
@@ -186,7 +186,7 @@ RowSpectra row_spectra(const Image& image, int orders, int threads, Progress& pr
                         kRowBlock);
   const size_t vectors = static_cast<size_t>(spectra.blocks) * kRowVectors;
   if (method == RowMethod::automatic) {
-    method = orders <= direct_orders(image.width) ? RowMethod::direct : RowMethod::fourier;
+    method = orders <= direct_row_orders(image.width) ? RowMethod::direct : RowMethod::fourier;
   }
   if (method == RowMethod::direct) {
     const QuarterTable table(orders, image.width);

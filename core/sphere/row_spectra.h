@@ -37,6 +37,9 @@ enum class RowMethod {
   fourier,    // fast Fourier transforms of whole rows, any width
 };
 
+// Up to this many orders direct sums cost less than a transform; 0 when the width forbids them.
+int direct_row_orders(int width);
+
 // Orders m < `orders` of an RGB image. The same bits for any number of threads. Reports progress
 // from 0 to 0.5.
 RowSpectra row_spectra(const Image& image, int orders, int threads, Progress& progress,

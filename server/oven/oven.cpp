@@ -160,6 +160,7 @@ class Oven {
     const auto add = [&](const std::string& name, const char* role, const std::string& json) {
       assembly.artifacts.push_back({name, role, "application/json", as_bytes(json)});
     };
+    for (Artifact& file : write_exports(assembly)) assembly.artifacts.push_back(std::move(file));
     add(document_name(spec_.kind()), "document", write_document(assembly, spec_, plan()));
     add("plan.json", "plan", write_plan(plan()));
     add("accuracy.json", "accuracy", accuracy);

@@ -39,6 +39,7 @@ Spec maps() {
   p.irradiance = IrradianceOutput{};
   p.prefilter = PrefilterOutput{};
   p.dfg = DfgOutput{};
+  p.spectrum = SpectrumOutput{};
   spec.parameters = p;
   return spec;
 }
@@ -54,6 +55,17 @@ Spec probes() {
 TEST(Spec, DefaultsOfEveryKindCanBeOrdered) {
   for (const Spec& spec : {ao(), maps(), probes()})
     EXPECT_EQ(faults(spec), std::vector<std::string>{});
+}
+
+TEST(Spec, AWindowsQuantityNeedsAWindow) {
+  Spec spec = maps();
+  ShOutput& sh = *std::get<EnvironmentMapsParameters>(spec.parameters).sh;
+  sh.window_quantity = ShQuantity::radiance;
+  EXPECT_EQ(faults(spec), std::vector<std::string>{"/parameters/sh/window_quantity conflict"});
+  sh.window = ShWindow::hann;
+  EXPECT_EQ(faults(spec), std::vector<std::string>{});
+  sh.exports = 1u << 7;
+  EXPECT_EQ(faults(spec), std::vector<std::string>{"/parameters/sh/exports range"});
 }
 
 TEST(Spec, KindsHaveTheirOwnDefaultErrorAndNames) {

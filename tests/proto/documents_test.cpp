@@ -114,7 +114,9 @@ TEST(AccuracyJson, GivesRmsOverAllElements) {
 TEST(DocumentJson, CarriesConventionAndSelftest) {
   Spec spec;
   spec.environment = InputRef{sha256_digest("x", 1), {}};
-  spec.parameters = EnvironmentMapsParameters{ShOutput{1}, {}, {}, {}};
+  EnvironmentMapsParameters parameters;
+  parameters.sh = ShOutput{1};
+  spec.parameters = parameters;
   Plan plan;
   plan.kind = Kind::environment_maps;
   EnvironmentDocument document;

@@ -216,7 +216,13 @@ Spec random_spec() {
         (p->falloff != Falloff::none && p->falloff != Falloff::exponential))
       p->max_distance = positive();
   } else if (auto* maps = std::get_if<EnvironmentMapsParameters>(&spec.parameters)) {
-    maps->sh = ShOutput{*rc::gen::inRange(1, 34)};
+    maps->sh = ShOutput{*rc::gen::inRange(1, 130)};
+    maps->sh->window = ShWindow(*rc::gen::inRange(0, 4));
+    if (maps->sh->window != ShWindow::none && *rc::gen::arbitrary<bool>())
+      maps->sh->window_quantity = ShQuantity::radiance;
+    maps->sh->zh3 = *rc::gen::arbitrary<bool>();
+    maps->sh->exports = *rc::gen::inRange(0u, 128u);
+    if (*rc::gen::arbitrary<bool>()) maps->spectrum = SpectrumOutput{*rc::gen::inRange(1, 130)};
     if (*rc::gen::arbitrary<bool>()) maps->dfg = DfgOutput{*rc::gen::inRange(8, 1025)};
     if (*rc::gen::arbitrary<bool>())
       maps->prefilter = PrefilterOutput{1 << *rc::gen::inRange(3, 12), 4};

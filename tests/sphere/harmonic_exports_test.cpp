@@ -77,6 +77,22 @@ TEST(HarmonicExports, EveryEngineSeesOurIrradianceInEveryCoefficient) {
   }
 }
 
+// Irradiance / pi by the engine's formula at a normal in its own axes.
+TEST(HarmonicExports, CarryASelftestThatTheEnginePasses) {
+  ShRgb sky(5);
+  for (uint32_t i = 0; i < 25; ++i) sky.coefficients[i] = Vec3d{1, 2, 3} * (sobol2(6, i).x - 0.5);
+  for (const ShTarget target : kShTargets) {
+    const ShExport sh = export_sh(sky, target);
+    ASSERT_EQ(sh.selftest.size(), 6u);
+    for (const auto& [normal, diffuse] : sh.selftest) {
+      EXPECT_NEAR(length(normal), 1, 1e-15);
+      const auto axes = sh_target_axes(target);
+      const Vec3d ours = axes[0] * normal.x + axes[1] * normal.y + axes[2] * normal.z;
+      EXPECT_LT(length(engine_diffuse(sh, ours) - diffuse), 1e-5) << sh_target_name(target);
+    }
+  }
+}
+
 // Positive control: what a furnace or a symmetric sky cannot see.
 TEST(HarmonicExports, WouldShowASwapASignAndAFactorOfPi) {
   const auto swap = [](ShExport& sh) { std::swap(sh.coefficients[6], sh.coefficients[7]); };

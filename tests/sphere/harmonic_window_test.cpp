@@ -40,20 +40,20 @@ WindowedSh window(const ShRgb& sh, ShWindow kind, ShQuantity quantity = ShQuanti
 // The unit delta's irradiance of three bands spans [-19/480, 17/16]; its mean is 1/4.
 TEST(HarmonicWindow, KnowsHowADeltaRings) {
   const WindowedSh hann = window(delta(normalize(Vec3d{0.3, -0.5, 0.7}), 3), ShWindow::hann);
-  EXPECT_NEAR(hann.before.luminance_min / 4, -19.0 / 480, 1e-9);
-  EXPECT_NEAR(hann.before.luminance_max / 4, 17.0 / 16, 1e-9);
-  EXPECT_NEAR(hann.after.luminance_min / 4, -0.0469, 5e-5);
+  EXPECT_NEAR(hann.report.before.luminance_min / 4, -19.0 / 480, 1e-9);
+  EXPECT_NEAR(hann.report.before.luminance_max / 4, 17.0 / 16, 1e-9);
+  EXPECT_NEAR(hann.report.after.luminance_min / 4, -0.0469, 5e-5);
   const WindowedSh lanczos = window(delta({0, 1, 0}, 3), ShWindow::lanczos);
-  EXPECT_NEAR(lanczos.after.luminance_min / 4, -0.0343, 5e-5);
+  EXPECT_NEAR(lanczos.report.after.luminance_min / 4, -0.0343, 5e-5);
 }
 
 TEST(HarmonicWindow, FindsTheSmallestFilterOfADelta) {
   for (uint32_t i = 0; i < 6; ++i) {
     const WindowedSh result =
         window(delta(random_direction(1, i), 3, {1, 5, 0.1}), ShWindow::minimal);
-    EXPECT_NEAR(result.lambda, 0.17773, 5e-6);
-    EXPECT_GE(result.after.lowest, -1e-6);
-    EXPECT_GE(result.proven_lowest, -3e-6);
+    EXPECT_NEAR(result.report.lambda, 0.17773, 5e-6);
+    EXPECT_GE(result.report.after.lowest, -1e-6);
+    EXPECT_GE(result.report.proven_lowest, -3e-6);
   }
 }
 
@@ -81,10 +81,10 @@ TEST(HarmonicWindow, IsMinimalAtAnyNumberOfBands) {
   for (const int bands : {2, 3, 4, 6, 9, 17, 33}) {
     for (const ShQuantity quantity : {ShQuantity::radiance, ShQuantity::irradiance}) {
       const WindowedSh result = window(delta({0.6, 0, 0.8}, bands), ShWindow::minimal, quantity);
-      EXPECT_GE(brute_lowest(bands, result.lambda, quantity), -2e-6) << bands;
-      EXPECT_GE(result.proven_lowest, -3e-6) << bands;
-      if (result.lambda > 0) {
-        EXPECT_LT(brute_lowest(bands, 0.999 * result.lambda, quantity), -1e-6) << bands;
+      EXPECT_GE(brute_lowest(bands, result.report.lambda, quantity), -2e-6) << bands;
+      EXPECT_GE(result.report.proven_lowest, -3e-6) << bands;
+      if (result.report.lambda > 0) {
+        EXPECT_LT(brute_lowest(bands, 0.999 * result.report.lambda, quantity), -1e-6) << bands;
       }
     }
   }
@@ -95,10 +95,10 @@ TEST(HarmonicWindow, KeepsTheMeanToTheBitAndLeavesPositiveLightAlone) {
   sky.coefficients[0] += Vec3d{3.1, 2.7, 1.9};
   for (const ShQuantity quantity : {ShQuantity::radiance, ShQuantity::irradiance}) {
     const WindowedSh result = window(sky, ShWindow::minimal, quantity);
-    EXPECT_EQ(result.lambda, 0);
+    EXPECT_EQ(result.report.lambda, 0);
     EXPECT_EQ(result.sh.coefficients, sky.coefficients);
-    EXPECT_EQ(result.energy_removed, 0);
-    EXPECT_EQ(result.contrast_removed, 0);
+    EXPECT_EQ(result.report.energy_removed, 0);
+    EXPECT_EQ(result.report.contrast_removed, 0);
   }
   const ShRgb sun = delta({0, 1, 0}, 5, {0.7, 1.3, 2.9});
   for (const ShWindow kind : {ShWindow::hann, ShWindow::lanczos, ShWindow::minimal}) {
@@ -125,9 +125,9 @@ TEST(HarmonicWindow, ServesEveryChannelAndEveryDirection) {
   }
   EXPECT_LT(before, -0.5);
   EXPECT_GE(after, -1e-5);
-  EXPECT_GT(result.energy_removed, 0.1);
-  EXPECT_GT(result.contrast_removed, 0.1);
-  EXPECT_LT(result.contrast_removed, 1);
+  EXPECT_GT(result.report.energy_removed, 0.1);
+  EXPECT_GT(result.report.contrast_removed, 0.1);
+  EXPECT_LT(result.report.contrast_removed, 1);
 }
 
 TEST(HarmonicWindow, ServesAWholeMapWithASun) {
@@ -136,9 +136,9 @@ TEST(HarmonicWindow, ServesAWholeMapWithASun) {
   for (const int bands : {3, 9, 33}) {
     const ShRgb sh = world_harmonics(project_latlong(sky, bands, 3, 1, progress), bands);
     const WindowedSh result = window(sh, ShWindow::minimal, ShQuantity::radiance);
-    EXPECT_LT(result.before.lowest, -0.1);
-    EXPECT_GE(result.after.lowest, -2e-6);
-    EXPECT_GT(result.lambda, 0);
+    EXPECT_LT(result.report.before.lowest, -0.1);
+    EXPECT_GE(result.report.after.lowest, -2e-6);
+    EXPECT_GT(result.report.lambda, 0);
   }
 }
 

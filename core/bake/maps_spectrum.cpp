@@ -1,0 +1,87 @@
+// Energy by band and the bands that are enough.
+
+#include <cmath>
+
+#include "core/bake/accuracy.h"
+#include "core/bake/maps_cost.h"
+#include "core/bake/maps_sh.h"
+
+namespace lightkiln {
+
+namespace {
+
+class Spectrum : public MapsOutput {
+ public:
+  Spectrum(int bands, bool constant, double ordered)
+      : bands_(bands), constant_(constant), ordered_(ordered) {}
+
+  double error_bound() const override { return constant_ ? 0 : kShErrorBound; }
+  SpectrumNeed spectrum_need() const override { return {constant_ ? 0 : bands_, nullptr}; }
+  double model_seconds(MapsLight& light) const override {
+    const Image& map = light.environment().radiance;
+    return constant_ ? 0 : kEnergyPerTexel * map.width * map.height;
+  }
+
+  // Bytes: the mean, the whole energy, the energy of each band.
+  MeasuredError make(MapsLight& light, int check_texels, ByteWriter& writer,
+                     Progress& progress) const override {
+    const Environment& environment = light.environment();
+    const Vec3d whole = constant_ ? environment.mean * environment.mean * (4 * kPi)
+                                  : latlong_energy(environment.radiance, light.threads(), progress);
+    std::vector<Vec3d> energy(static_cast<size_t>(bands_));
+    if (constant_) {
+      energy[0] = whole;
+    } else {
+      const std::vector<Vec3d> known = band_energy(light.spectrum(progress));
+      std::copy_n(known.begin(), energy.size(), energy.begin());
+    }
+    for (const Vec3d& v : {environment.mean, whole}) write(v, writer);
+    for (const Vec3d& v : energy) write(v, writer);
+    return check_coefficients(light, bands_, check_texels, progress);
+  }
+
+  void file(ByteReader& reader, const MeasuredError& measured, Assembly*,
+            EnvironmentDocument* document) const override {
+    const Vec3d mean = read(reader), whole = read(reader);
+    std::vector<Vec3d> energy(static_cast<size_t>(bands_));
+    for (Vec3d& v : energy) v = read(reader);
+    SpectrumDocument spectrum;
+    spectrum.spectrum = make_spectrum(energy, whole, mean);
+    spectrum.ordered = advise_bands(spectrum.spectrum, ordered_);
+    for (const double error : kQuotedErrors) {
+      spectrum.quoted.push_back(advise_bands(spectrum.spectrum, error));
+    }
+    spectrum.error_bound = error_bound();
+    spectrum.measured = measured;
+    document->spectrum = std::move(spectrum);
+  }
+
+ private:
+  static void write(const Vec3d& v, ByteWriter& writer) {
+    for (int channel = 0; channel < 3; ++channel) writer.f64(v[channel]);
+  }
+  static Vec3d read(ByteReader& reader) {
+    Vec3d v;
+    for (int channel = 0; channel < 3; ++channel) v[channel] = reader.f64();
+    return v;
+  }
+
+  int bands_;
+  bool constant_;
+  double ordered_;
+};
+
+void order_spectrum(const EnvironmentMapsParameters& parameters, MapsLight& light, double target,
+                    MapsOutputs* outputs) {
+  outputs->push_back(std::make_unique<Spectrum>(parameters.spectrum->bands, light.constant(),
+                                                ordered_error(target)));
+}
+
+}  // namespace
+
+const MapsProduct kSpectrumProduct = {
+    "spectrum", "The spectrum by band is ordered.", true,
+    [](const EnvironmentMapsParameters& parameters) { return parameters.spectrum.has_value(); },
+    order_spectrum};
+
+}  // namespace lightkiln
