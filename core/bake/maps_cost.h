@@ -19,11 +19,9 @@ inline constexpr double kPerDfgValue = 2.8e-6;
 inline constexpr double kBrutePerTexel = 5e-9;  // of the map, each texel that is checked
 
 inline constexpr double kEnergyPerTexel = 2e-9;
-// Windows look for extremes on grids of 32 points a band squared; `minimal` does so about this
-// often.
-inline constexpr double kWindowSearches = 16;
-inline constexpr double kSearchPerGrid = 1.5e-6;
-inline constexpr double kSearchPerPoint = 2e-6;
+// Windows look for extremes on grids of 32 points a band squared; `minimal` does so about 20 times.
+inline constexpr double kWindowSearches = 20;
+inline constexpr double kPerSearch = 6e-6;  // bands^2
 
 // This machine's time over that of the model's core, from a run of under a millisecond.
 double measure_speed();

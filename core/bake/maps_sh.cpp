@@ -82,7 +82,7 @@ class Coefficients : public MapsOutput {
     if (constant_ || order_.window == ShWindow::none) return 0;
     const double searches = order_.window == ShWindow::minimal ? kWindowSearches : 6;
     const double bands = order_.bands;
-    return searches * (kSearchPerGrid * bands * bands + kSearchPerPoint * bands * bands);
+    return searches * kPerSearch * bands * bands;
   }
 
   // Bytes: the coefficients as ordered, the report of a window, the raw bands of ZH3.

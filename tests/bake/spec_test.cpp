@@ -113,7 +113,7 @@ TEST(Spec, DigestsAndResourceNamesAreChecked) {
 TEST(Spec, EnvironmentMapsAreHeldToTheirRanges) {
   Spec spec = maps();
   auto& p = std::get<EnvironmentMapsParameters>(spec.parameters);
-  p.sh->bands = 34;
+  p.sh->bands = 130;
   p.irradiance->size = 0;
   p.prefilter = PrefilterOutput{100, 1};
   p.dfg->size = 7;

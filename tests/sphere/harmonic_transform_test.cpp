@@ -106,6 +106,28 @@ TEST(HarmonicTransform, EqualsTheSumOverTexels) {
   }
 }
 
+// A map of one basis function at a time, over a mean that keeps it positive: every coefficient
+// turns up where it belongs, with its sign, and nowhere else.
+TEST(HarmonicTransform, FindsEachHarmonicWhereItBelongs) {
+  constexpr int kBands = 5;
+  std::vector<double> basis(25);
+  for (size_t i = 1; i < 25; ++i) {
+    Image map(128, 64, 3);
+    for (int y = 0; y < map.height; ++y) {
+      for (int x = 0; x < map.width; ++x) {
+        sh_evaluate_basis(latlong_direction((x + 0.5) / 128, (y + 0.5) / 64), kBands, basis);
+        for (int c = 0; c < 3; ++c) map.at(x, y)[c] = static_cast<float>(2 + (c + 1) * basis[i]);
+      }
+    }
+    const ShRgb sh = project(map, kBands);
+    for (size_t k = 1; k < 25; ++k) {
+      for (int c = 0; c < 3; ++c) {
+        EXPECT_NEAR(sh.coefficients[k][c], k == i ? c + 1 : 0, 5e-3) << i << " " << k;
+      }
+    }
+  }
+}
+
 TEST(HarmonicTransform, IsExactOverABoxWherePointsAreNot) {
   const Image sky = reference::test_sky(16, 1000.0);
   const ShRgb truth = extrapolated(sky, 6, 16);

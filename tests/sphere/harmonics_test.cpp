@@ -235,6 +235,14 @@ TEST(Harmonics, RotateADeltaToItsRotatedDirection) {
     EXPECT_NEAR(rotated.coefficients[i].y, 2 * moved[i], 1e-12) << i;
     EXPECT_NEAR(returned.coefficients[i].z, 3 * values[i], 1e-12) << i;
   }
+  for (int l = 0; l < kBands; ++l) {
+    double energy = 0;
+    for (int m = -l; m <= l; ++m) energy += std::pow(rotated.coefficients[sh_index(l, m)].x, 2);
+    EXPECT_NEAR(energy, (2 * l + 1) / (4 * kPi), 1e-12) << l;
+  }
+  // Positive control: the turn the wrong way round ends elsewhere.
+  const ShRgb wrong = sh_rotate(delta, back);
+  EXPECT_GT(std::abs(wrong.coefficients[1].x - moved[1]), 0.05);
 }
 
 }  // namespace
