@@ -151,7 +151,8 @@ TEST(SpecCanonical, EnvironmentMapsHaveNoSamplesNoSeedAndNoTimeLimit) {
   const std::string canonical = canonical_spec(parse_spec(maps("")).spec);
   EXPECT_EQ(canonical,
             R"({"accuracy":{"check_texels":4,"target_error":0.001},"inputs":{"environment":)" + kA +
-                R"(},"kind":"environment_maps","parameters":{"sh":{"bands":3}}})");
+                R"(},"kind":"environment_maps","parameters":{"sh":{"bands":3,"exports":[],)" +
+                R"("window":"none","window_quantity":"irradiance","zh3":false}}})");
   EXPECT_TRUE(faults_of(canonical).empty());
   EXPECT_EQ(
       faults_of(maps(R"(,"accuracy":{"max_samples":64,"max_seconds":1},"seed":2)")),
