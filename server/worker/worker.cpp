@@ -27,15 +27,17 @@ constexpr int kMaxRefusedTries = 12;
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr int kCancelGraceMs = 1000;  // from a polite request to SIGKILL
 
-volatile std::sig_atomic_t g_signalled = 0;
+// A handler runs on whichever thread the signal meets, so this is no sig_atomic_t.
+std::atomic<bool> g_signalled{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
 
 // SIGTERM and SIGINT ask for an orderly end; the handlers of before come back afterwards.
 class StopSignals {
  public:
   StopSignals() {
-    g_signalled = 0;
+    g_signalled.store(false);
     struct sigaction action {};
-    action.sa_handler = [](int) { g_signalled = 1; };
+    action.sa_handler = [](int) { g_signalled.store(true); };
     sigaction(SIGTERM, &action, &term_);
     sigaction(SIGINT, &action, &int_);
   }
@@ -78,7 +80,7 @@ class Worker {
     return store;
   }
 
-  bool stopping() const { return g_signalled != 0 || (options_.stop && options_.stop->load()); }
+  bool stopping() const { return g_signalled.load() || (options_.stop && options_.stop->load()); }
   bool timed_out() const { return wall_seconds() > deadline_s_; }
   bool interrupted() const {
     return stopping() || timed_out() || (heartbeat_ && heartbeat_->lost());
