@@ -1,10 +1,11 @@
 #include "core/environment/environment.h"
 
 #include <algorithm>
-#include <string>
+#include <cmath>
+#include <optional>
 #include <utility>
 
-#include "core/base/error.h"
+#include "core/environment/layout_convert.h"
 #include "core/image/decode.h"
 #include "core/sphere/direction_map.h"
 #include "core/sphere/solid_angle.h"
@@ -25,45 +26,26 @@ Image to_rgb(Image source) {
   return rgb;
 }
 
-// OpenEXR's lat-long standard puts the centres of the outermost pixels on longitudes +-pi and
-// latitudes +-pi/2, so its pixel (x, y) samples u = x / (W - 1), v = y / (H - 1). Texel (i, j) of
-// our grid looks at u = (i + 1/2) / W: bilinear interpolation between the four samples around it.
-Image from_border_texels(const Image& source) {
-  Image result(source.width, source.height, 3);
-  for (int j = 0; j < source.height; ++j) {
-    const double y = (j + 0.5) / source.height * (source.height - 1);
-    const int y0 = std::min(static_cast<int>(y), std::max(source.height - 2, 0));
-    const int y1 = std::min(y0 + 1, source.height - 1);
-    const float fy = static_cast<float>(y - y0);
-    for (int i = 0; i < source.width; ++i) {
-      const double x = (i + 0.5) / source.width * (source.width - 1);
-      const int x0 = std::min(static_cast<int>(x), std::max(source.width - 2, 0));
-      const int x1 = std::min(x0 + 1, source.width - 1);
-      const float fx = static_cast<float>(x - x0);
-      const Vec3 top = source.rgb(x0, y0) * (1 - fx) + source.rgb(x1, y0) * fx;
-      const Vec3 bottom = source.rgb(x0, y1) * (1 - fx) + source.rgb(x1, y1) * fx;
-      const Vec3 value = top * (1 - fy) + bottom * fy;
-      std::copy_n(&value.x, 3, result.at(i, j));
-    }
+// The whole columns that a turn about +Y moves a lat-long map to the left, or nothing. A yaw of
+// +90 degrees brings what stood at +Z (the centre) to +X (a quarter left of it).
+std::optional<int> whole_columns(const MapLayout& layout, const Rotation& rotation) {
+  if (layout.kind != LayoutKind::latlong || layout.convention != TexelConvention::half_texel) {
+    return std::nullopt;
   }
-  return result;
+  if (rotation.rows[1][1] != 1) return std::nullopt;
+  const double turn = std::atan2(rotation.rows[0][2], rotation.rows[2][2]) / (2 * kPi);
+  const double columns = std::nearbyint(turn * layout.width);
+  if (std::abs(turn * layout.width - columns) > 1e-9 * layout.width) return std::nullopt;
+  return (static_cast<int>(columns) + layout.width) % layout.width;
 }
 
-void check_shape(const DecodedImage& decoded) {
-  const Image& image = decoded.image;
-  const std::string size = std::to_string(image.width) + " x " + std::to_string(image.height);
-  if (decoded.envmap == EnvmapAttribute::cube) {
-    throw Error(ErrorCode::invalid_input,
-                "The environment is a cube map (" + size +
-                    " pixels, `envmap` attribute); a lat-long map, twice as wide as high, is "
-                    "needed here.");
+Image move_columns(const Image& source, int left) {
+  Image moved(source.width, source.height, 3);
+  for (int y = 0; y < source.height; ++y) {
+    const float* row = source.at(0, y);
+    std::rotate_copy(row, row + 3 * left, row + 3 * source.width, moved.at(0, y));
   }
-  const bool single = image.width == 1 && image.height == 1;
-  if (image.width < 1 || image.height < 1 || (image.width != 2 * image.height && !single)) {
-    throw Error(ErrorCode::invalid_input, "The environment is " + size +
-                                              " pixels; a lat-long map covers the whole sphere "
-                                              "and is exactly twice as wide as high.");
-  }
+  return moved;
 }
 
 // Fills in what follows from the pixels.
@@ -89,13 +71,28 @@ void summarise(Environment* environment) {
 
 }  // namespace
 
-Environment make_environment(DecodedImage decoded) {
-  check_shape(decoded);
+Environment make_environment(DecodedImage decoded, const SourceReading& reading,
+                             const Rotation& rotation, int threads, Progress* progress) {
   Environment environment;
-  environment.radiance = to_rgb(std::move(decoded.image));
-  environment.repairs = sanitise(environment.radiance);
-  if (decoded.envmap == EnvmapAttribute::latlong) {
-    environment.radiance = from_border_texels(environment.radiance);
+  environment.source_layout = source_layout(decoded, reading);
+  environment.rotation = rotation;
+  environment.covered_share = covered_solid_angle(environment.source_layout) / (4 * kPi);
+  Image image = to_rgb(std::move(decoded.image));
+  environment.repairs = sanitise(image);
+  const bool turned = !rotation.is_identity();
+  const std::optional<int> columns = whole_columns(environment.source_layout, rotation);
+  if (columns && *columns == 0) {
+    environment.radiance = std::move(image);
+  } else {
+    Progress silent;
+    environment.radiance =
+        columns ? move_columns(image, *columns)
+                : convert_layout(environment.source_layout, image,
+                                 make_layout(LayoutKind::latlong,
+                                             holding_width(environment.source_layout, turned)),
+                                 rotation, MapFilter::adaptive, threads,
+                                 progress != nullptr ? *progress : silent);
+    environment.source = std::move(image);
   }
   summarise(&environment);
   return environment;
@@ -106,6 +103,7 @@ Environment constant_environment(const Vec3& radiance) {
   environment.radiance = Image(1, 1, 3);
   std::copy_n(&radiance.x, 3, environment.radiance.at(0, 0));
   environment.repairs = sanitise(environment.radiance);
+  environment.source_layout = make_layout(LayoutKind::latlong, 1);
   summarise(&environment);
   return environment;
 }

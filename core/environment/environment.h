@@ -2,10 +2,12 @@
 
 // Distant light as a lat-long image of radiance, and the one way to look it up.
 
-#include <optional>
-
 #include "core/base/math.h"
+#include "core/base/progress.h"
+#include "core/environment/source_layout.h"
 #include "core/image/exr.h"
+#include "core/sphere/map_layout.h"
+#include "core/sphere/rotation.h"
 
 namespace lightkiln {
 
@@ -15,13 +17,25 @@ struct Environment {
   bool constant = false;  // every texel equal: answers come in closed form
   Vec3d mean;             // (1/4pi) integral of radiance, exact texel solid angles
   double max_luminance = 0;
+
+  // What was read: its layout, and its pixels before rotation when `radiance` is not they
+  // themselves.
+  MapLayout source_layout;
+  Image source;
+  Rotation rotation;         // already applied to `radiance`
+  double covered_share = 1;  // of the sphere, by the source; the rest is black
+
+  const Image& source_image() const { return source.pixels.empty() ? radiance : source; }
 };
 
-// Takes a decoded lat-long image: checks the 2:1 shape, converts 1 channel to 3, resamples
-// OpenEXR's texels-on-the-border convention when the file carries `envmap = latlong`, sanitises and
-// counts. Throws Error{invalid_input}: wrong shape (a photograph), a cube where a lat-long is
-// needed. Hand the image over with std::move: an 8192 x 4096 map takes 384 MiB.
-Environment make_environment(DecodedImage decoded);
+// Takes a decoded image: finds its layout, converts 1 channel to 3, sanitises and counts, turns and
+// brings to a half-texel lat-long of holding_width(). A half-texel lat-long map is kept as it is,
+// and a yaw of whole texels only moves its columns; otherwise the map is converted (see
+// layout_convert.h, adaptive). Throws Error{invalid_input}: the shape does not fit the layout (a
+// photograph). Hand the image over with std::move: an 8192 x 4096 map takes 384 MiB.
+Environment make_environment(DecodedImage decoded, const SourceReading& reading = {},
+                             const Rotation& rotation = {}, int threads = 1,
+                             Progress* progress = nullptr);
 
 // A constant environment of the given radiance (1x1 texel).
 Environment constant_environment(const Vec3& radiance);

@@ -54,7 +54,8 @@ struct Task {
   MapFilter filter;
   TexelDensity density;  // of the source
   bool turned;
-  bool wraps;
+  int turn;               // columns of a whole turn of the source, 0 = it does not close
+  int least;              // of halving any texel: cells wider than 4 degrees have curved edges
   int depth;              // of halving a cell that straddles a seam
   double span_x, span_y;  // the widest cell that is taken for a polygon, in source texels
 };
@@ -85,9 +86,8 @@ bool outline(const Task& task, const std::array<Corner, 4>& corners,
       chart = place.chart;
     }
     (*points)[i] = {place.x, place.y};
-    if (task.wraps && i > 0) {
-      const double width = task.from.width;
-      (*points)[i].x -= width * std::nearbyint((place.x - (*points)[0].x) / width);
+    if (task.turn > 0 && i > 0) {
+      (*points)[i].x -= task.turn * std::nearbyint((place.x - (*points)[0].x) / task.turn);
     }
   }
   for (size_t i = 0; i < 4; ++i) {
@@ -123,7 +123,7 @@ class Gatherer {
   // Level 0 is the whole texel.
   void add(const Cell& cell, int level, Sums* sums) {
     std::array<GridPoint, 4> points;
-    if (outline(task_, cell.corners, &points)) {
+    if (level >= task_.least && outline(task_, cell.corners, &points)) {
       add_polygon(cell, points, level, sums);
     } else if (level == task_.depth) {
       add_point(cell, sums);
@@ -139,33 +139,37 @@ class Gatherer {
     if (task_.filter == MapFilter::adaptive) {
       smooth = std::clamp(3 - 2 * std::ldexp(print.smaller, level), 0.0, 1.0);
     }
-    if (smooth < 1) add_area(points, 1 - smooth, sums);
+    if (smooth < 1) add_area(cell, points, 1 - smooth, sums);
     if (smooth > 0) add_smooth(cell, points, print, smooth, sums);
   }
 
-  void add_area(const std::array<GridPoint, 4>& points, double share, Sums* sums) {
+  void add_area(const Cell& cell, const std::array<GridPoint, 4>& points, double share,
+                Sums* sums) {
     coverage_.cover(points.data(), points.size());
-    const int width = task_.from.width;
+    const double before = sums->omega;
+    const int turn = task_.turn;
     for (int y = coverage_.top(); y <= coverage_.bottom(); ++y) {
       const int row = std::clamp(y, 0, task_.from.height - 1);
       for (int x = coverage_.left(); x <= coverage_.right(); ++x) {
         const double area = coverage_.area(x, y);
         if (area <= 0) continue;
         const int column =
-            task_.wraps ? ((x % width) + width) % width : std::clamp(x, 0, width - 1);
+            turn > 0 ? ((x % turn) + turn) % turn : std::clamp(x, 0, task_.from.width - 1);
         sums->add(to_double(task_.source.rgb(column, row)),
                   share * area * task_.density(column, row));
       }
     }
+    // All of it on texels of a rim whose samples lie outside.
+    if (sums->omega == before) add_point(cell, sums);
   }
 
-  // At least two points per source texel's side, at places interpolated between the corners.
+  // At least four points per source texel's side, whose sum misses the integral of a bilinear tent
+  // by less than 1 / (4 pi)^2 of it, at places interpolated between the corners.
   void add_smooth(const Cell& cell, const std::array<GridPoint, 4>& p, const Footprint& print,
                   double share, Sums* sums) {
-    const int columns = std::clamp(static_cast<int>(std::ceil(2 * print.along_x)), 1, 64);
-    const int rows = std::clamp(static_cast<int>(std::ceil(2 * print.along_y)), 1, 64);
+    const int columns = std::clamp(static_cast<int>(std::ceil(4 * print.along_x)), 1, 64);
+    const int rows = std::clamp(static_cast<int>(std::ceil(4 * print.along_y)), 1, 64);
     const double weight = share * target_omega(cell) / (columns * rows);
-    const double width = task_.from.width;
     int chart = 0;
     for (const Corner& corner : cell.corners) chart = std::max(chart, corner.place.chart);
     for (int j = 0; j < rows; ++j) {
@@ -175,7 +179,10 @@ class Gatherer {
       for (int i = 0; i < columns; ++i) {
         const double s = (i + 0.5) / columns;
         MapPlace place{left.x + s * (right.x - left.x), left.y + s * (right.y - left.y), chart};
-        if (task_.wraps) place.x -= width * std::floor(place.x / width);
+        if (task_.turn > 0) {
+          const double start = task_.from.convention == TexelConvention::openexr ? 0.5 : 0;
+          place.x -= task_.turn * std::floor((place.x - start) / task_.turn);
+        }
         sums->add(smooth_radiance(task_.from, task_.source, place), weight);
       }
     }
@@ -231,13 +238,13 @@ std::vector<Block> blocks_of(const MapLayout& layout) {
   return blocks;
 }
 
-// Lines between texels, held off a face's borders, which belong to two faces, and off what lies
-// beyond the samples of the openexr convention.
+// Lines between texels, held off borders that belong to two faces or are all one direction (the
+// poles, whose longitude would be lost), and off what lies beyond the samples of the openexr
+// convention.
 double grid_line(const MapLayout& layout, int line, int start, int count) {
-  const double margin = layout.convention == TexelConvention::openexr ? 0.5
-                        : is_cube(layout.kind)                        ? 1e-9
-                                                                      : 0.0;
-  return std::clamp(static_cast<double>(line), start + margin, start + count - margin);
+  const double margin = layout.convention == TexelConvention::openexr ? 0.5 : 0.0;
+  return std::clamp(static_cast<double>(line), start + margin + 1e-9,
+                    start + count - margin - 1e-9);
 }
 
 void write(const Sums& sums, float* out) {
@@ -353,18 +360,20 @@ Task make_task(const MapLayout& from, const Image& source, const MapLayout& to,
             filter,
             TexelDensity(from),
             !rotation.is_identity(),
-            wraps_around(from),
+            turn_columns(from),
+            0,
             0,
             0,
             0};
   // Cells at a seam end at an eighth of a source texel.
   const double ratio = mean_pitch(to) / mean_pitch(from);
+  constexpr double kStraight = 0.07;  // radians
+  task.least = std::clamp(static_cast<int>(std::ceil(std::log2(mean_pitch(to) / kStraight))), 0, 6);
   task.depth = std::clamp(static_cast<int>(std::ceil(std::log2(8 * ratio))), 3, 9);
   // Straight edges: within 1/48 of a turn along rows, 1/96 of the sphere's half turn otherwise.
   const int size = is_cube(from.kind) ? cube_face_size(from) : from.height;
-  task.span_x = std::max(2.0, from.width == from.height ? size / 96.0 : from.width / 48.0);
-  if (is_cube(from.kind)) task.span_x = std::max(2.0, size / 24.0);
-  task.span_y = std::max(2.0, is_cube(from.kind) ? size / 24.0 : size / 96.0);
+  task.span_y = std::max(4.0, size / (is_cube(from.kind) ? 24.0 : 96.0));
+  task.span_x = task.turn > 0 ? std::max(4.0, from.width / 48.0) : task.span_y;
   return task;
 }
 
@@ -406,16 +415,19 @@ bool walks_meridians(const Task& task) {
 
 }  // namespace
 
+bool moves_texels(const MapLayout& from, const MapLayout& to, const Rotation& rotation) {
+  if (!rotation.is_identity()) return false;
+  return from == to ||
+         (is_cube(from.kind) && is_cube(to.kind) && from.convention == to.convention &&
+          cube_face_size(from) == cube_face_size(to));
+}
+
 Image convert_layout(const MapLayout& from, const Image& source, const MapLayout& to,
                      const Rotation& rotation, MapFilter filter, int threads, Progress& progress) {
   check(from, source);
   if (layout_fault(to) != nullptr) throw Error(ErrorCode::invalid_input, layout_fault(to));
-  if (rotation.is_identity()) {
-    if (from == to) return source;
-    if (is_cube(from.kind) && is_cube(to.kind) && from.convention == to.convention &&
-        cube_face_size(from) == cube_face_size(to)) {
-      return move_faces(from, source, to);
-    }
+  if (moves_texels(from, to, rotation)) {
+    return from == to ? source : move_faces(from, source, to);
   }
   const Task task = make_task(from, source, to, rotation, filter);
   if (walks_meridians(task)) {

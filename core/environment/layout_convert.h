@@ -22,6 +22,9 @@ enum class MapFilter {
   adaptive
 };
 
+// Texels are only moved: equal layouts, or cube layouts of one face size and convention, unturned.
+bool moves_texels(const MapLayout& from, const MapLayout& to, const Rotation& rotation);
+
 // `source` (3 channels, of layout `from`) turned by `rotation`, as an image of layout `to`. What
 // the source does not cover is black; what the target does not show is 0. Between cube layouts of
 // one face size and convention, or equal layouts, without rotation, texels are moved and nothing is

@@ -30,15 +30,7 @@ bool is_interior(const MapLayout& layout, int chart, int x, int y) {
   return safe > 0 && right * right + down * down < safe * safe;
 }
 
-}  // namespace
-
-Vec3d nearest_radiance(const MapLayout& layout, const Image& image, const MapPlace& place) {
-  const int x = std::clamp(static_cast<int>(place.x), 0, layout.width - 1);
-  const int y = std::clamp(static_cast<int>(place.y), 0, layout.height - 1);
-  return to_double(image.rgb(x, y));
-}
-
-Vec3d smooth_radiance(const MapLayout& layout, const Image& image, const MapPlace& place) {
+Vec3d bilinear(const MapLayout& layout, const Image& image, const MapPlace& place) {
   const double px = place.x - 0.5, py = place.y - 0.5;
   const int x = floor_to_int(px), y = floor_to_int(py);
   const double fx = px - x, fy = py - y;
@@ -61,6 +53,51 @@ Vec3d smooth_radiance(const MapLayout& layout, const Image& image, const MapPlac
     total += weight;
   }
   return total > 0 ? sum / total : nearest_radiance(layout, image, place);
+}
+
+// A place at another radius of the disc, on the same diameter.
+MapPlace at_radius(const MapLayout& layout, const MapPlace& place, double scale) {
+  const double half = 0.5 * layout.width;
+  return {half + scale * (place.x - half), half + scale * (place.y - half), place.chart};
+}
+
+}  // namespace
+
+Vec3d nearest_radiance(const MapLayout& layout, const Image& image, const MapPlace& place) {
+  const int x = std::clamp(static_cast<int>(place.x), 0, layout.width - 1);
+  const int y = std::clamp(static_cast<int>(place.y), 0, layout.height - 1);
+  if (is_radial(layout.kind) && !texel_has_direction(layout, x, y)) {
+    // A texel that the rim cuts, with its sample outside: a texel further in.
+    const double radius = std::hypot(place.x - 0.5 * layout.width, place.y - 0.5 * layout.width);
+    return nearest_radiance(layout, image, at_radius(layout, place, 1 - 0.75 / radius));
+  }
+  return to_double(image.rgb(x, y));
+}
+
+Vec3d smooth_radiance(const MapLayout& layout, const Image& image, const MapPlace& place) {
+  if (!is_radial(layout.kind)) return bilinear(layout, image, place);
+  const double half = 0.5 * layout.width;
+  const double radius = std::hypot(place.x - half, place.y - half);
+  // Nearer to the rim than half a texel's diagonal the four samples around a place may all lie
+  // outside; further in one of them has a quarter of the weight.
+  const double inner_radius = std::max(0.0, half - 0.7072);
+  if (radius <= std::min(inner_radius, half - 1)) return bilinear(layout, image, place);
+  const auto at = [&](double scale) {
+    return bilinear(layout, image, at_radius(layout, place, scale));
+  };
+  const Vec3d inner = at(std::min(radius, inner_radius) / radius);
+  if (radial_limit(layout) < kPi) return inner;
+  // The whole rim is one direction: over the last texel the value goes over to the rim's mean.
+  const double share = std::clamp(radius - (half - 1), 0.0, 1.0);
+  if (share == 0) return inner;
+  constexpr int kRimPlaces = 8;
+  Vec3d rim;
+  for (int k = 0; k < kRimPlaces; ++k) {
+    const double angle = 2 * kPi * (k + 0.5) / kRimPlaces;
+    rim += bilinear(layout, image,
+                    {half + inner_radius * std::cos(angle), half + inner_radius * std::sin(angle)});
+  }
+  return inner * (1 - share) + rim * (share / kRimPlaces);
 }
 
 }  // namespace lightkiln

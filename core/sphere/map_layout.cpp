@@ -176,8 +176,9 @@ int cube_face_size(const MapLayout& layout) {
   return layout.kind == LayoutKind::vertical_cross ? layout.width / 3 : layout.width;
 }
 
-bool wraps_around(const MapLayout& layout) {
-  return !on_borders(layout) && (layout.kind == LayoutKind::latlong || is_cylinder(layout.kind));
+int turn_columns(const MapLayout& layout) {
+  if (layout.kind != LayoutKind::latlong && !is_cylinder(layout.kind)) return 0;
+  return on_borders(layout) ? layout.width - 1 : layout.width;
 }
 
 std::optional<Vec3d> layout_direction(const MapLayout& layout, double x, double y) {
@@ -275,20 +276,6 @@ bool continue_octahedral(int size, int* x, int* y) {
   return true;
 }
 
-// Past the rim of an angular map lies the opposite side at 2 - r. The other discs end.
-bool continue_radial(const MapLayout& layout, int* x, int* y) {
-  const int size = layout.width;
-  const double right = (2 * *x + 1.0) / size - 1, down = (2 * *y + 1.0) / size - 1;
-  const double radius = std::hypot(right, down);
-  if (radius <= 1) return true;
-  if (layout.kind != LayoutKind::angular) return false;
-  const double scale = -(2 - radius) / radius;
-  *x = static_cast<int>(std::floor((1 + scale * right) / 2 * size));
-  *y = static_cast<int>(std::floor((1 + scale * down) / 2 * size));
-  if (*x < 0 || *x >= size || *y < 0 || *y >= size) return false;
-  return texel_has_direction(layout, *x, *y);
-}
-
 }  // namespace
 
 bool continue_texel(const MapLayout& layout, int chart, int* x, int* y) {
@@ -302,7 +289,10 @@ bool continue_texel(const MapLayout& layout, int chart, int* x, int* y) {
   }
   if (is_cube(layout.kind)) return continue_cube(layout, chart, x, y);
   if (is_octahedral(layout.kind)) return continue_octahedral(layout.width, x, y);
-  if (is_radial(layout.kind)) return continue_radial(layout, x, y);
+  if (is_radial(layout.kind)) {
+    return *x >= 0 && *y >= 0 && *x < layout.width && *y < layout.height &&
+           texel_has_direction(layout, *x, *y);
+  }
   if (layout.kind == LayoutKind::cylinder) {
     *x = (*x % layout.width + layout.width) % layout.width;
     return *y >= 0 && *y < layout.height;

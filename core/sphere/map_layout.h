@@ -71,8 +71,8 @@ MapLayout make_layout(LayoutKind kind, int size);
 bool is_cube(LayoutKind kind);
 // N of a cube layout.
 int cube_face_size(const MapLayout& layout);
-// Columns 0 and width - 1 are neighbours.
-bool wraps_around(const MapLayout& layout);
+// Columns of a whole turn, of layouts whose left border continues the right one; 0 of others.
+int turn_columns(const MapLayout& layout);
 
 // The unit vector that the image shows at (x, y); nothing where it shows none (outside the disc,
 // the empty squares of a cross).
@@ -97,7 +97,7 @@ double covered_solid_angle(const MapLayout& layout);
 double solid_angle_density(const MapLayout& layout, double x, double y);
 
 // The texel that continues the image at (x, y), which may lie one texel outside it or outside a
-// face of `chart`; false where nothing continues it (a cube's corner, a horizon).
+// face of `chart`; false where nothing continues it (a cube's corner, the rim of a disc).
 bool continue_texel(const MapLayout& layout, int chart, int* x, int* y);
 
 }  // namespace lightkiln

@@ -35,7 +35,7 @@ TexelDensity::TexelDensity(const MapLayout& layout) {
   rows_ = layout.height;
   columns_ = by_row ? 1 : layout.width;
   values_.reserve(static_cast<size_t>(rows_) * static_cast<size_t>(columns_));
-  // Two Gauss points a side are exact to the fourth order of a texel; the rim's part is exact.
+  // Two Gauss points a side are exact to the fourth order of a texel.
   const double half = 0.5 / std::sqrt(3.0);
   for (int y = 0; y < rows_; ++y) {
     for (int x = 0; x < columns_; ++x) {
@@ -50,9 +50,6 @@ TexelDensity::TexelDensity(const MapLayout& layout) {
             value += 0.25 * solid_angle_density(layout, x + 0.5 + dx, y + 0.5 + dy);
           }
         }
-      } else {
-        value =
-            texel_solid_angle(layout, x, y) > 0 ? solid_angle_density(layout, x + 0.5, y + 0.5) : 0;
       }
       values_.push_back(static_cast<float>(value));
     }

@@ -13,7 +13,7 @@ class TexelDensity {
   explicit TexelDensity(const MapLayout& layout);
 
   // Mean of d(solid angle)/d(area) over the shown part of texel (x, y), in steradians per texel; 0
-  // where it shows nothing.
+  // where its sample shows nothing.
   double operator()(int x, int y) const {
     const size_t row = static_cast<size_t>(y % rows_);
     return values_[columns_ == 1

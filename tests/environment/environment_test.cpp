@@ -62,17 +62,33 @@ TEST(Environment, TakesOneChannelAsGrey) {
   EXPECT_EQ(environment.radiance.rgb(1, 1), (Vec3{3, 3, 3}));
 }
 
-TEST(Environment, RefusesCubesAndPhotographsBySentence) {
-  for (const auto& image : {decoded(Image(16, 96, 3), EnvmapAttribute::cube),
-                            decoded(Image(300, 200, 3)), decoded(Image(2, 2, 3))}) {
-    try {
-      make_environment(image);
-      FAIL();
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::invalid_input);
-      EXPECT_NE(std::string(error.what()).find("twice as wide"), std::string::npos);
-    }
+std::string refusal(const DecodedImage& image, const SourceReading& reading = {}) {
+  try {
+    make_environment(image, reading);
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::invalid_input);
+    return error.what();
   }
+  return "";
+}
+
+TEST(Environment, RefusesPhotographsAndNamesWhatIsAllowed) {
+  for (const auto& image : {Image(300, 200, 3), Image(400, 300, 3), Image(2, 2, 3)}) {
+    const std::string sentence = refusal(decoded(image));
+    EXPECT_NE(sentence.find("twice as wide"), std::string::npos);
+    EXPECT_NE(sentence.find("horizontal_cross (4N x 3N)"), std::string::npos);
+  }
+  const SourceReading cross{.layout = LayoutKind::horizontal_cross};
+  EXPECT_NE(refusal(decoded(Image(400, 200, 3)), cross).find("4N x 3N"), std::string::npos);
+  EXPECT_EQ(refusal(decoded(Image(400, 300, 3)), cross), "");
+  const SourceReading borders{.layout = LayoutKind::octahedral,
+                              .convention = TexelConvention::openexr};
+  EXPECT_NE(refusal(decoded(Image(64, 64, 3)), borders).find("cube strips only"),
+            std::string::npos);
+  // A cube that says so needs no word from the client; one of the wrong shape is refused.
+  EXPECT_EQ(refusal(decoded(Image(16, 96, 3), EnvmapAttribute::cube)), "");
+  EXPECT_NE(refusal(decoded(Image(16, 32, 3), EnvmapAttribute::cube)).find("N x 6N"),
+            std::string::npos);
 }
 
 TEST(Environment, LooksUpTheTexelThatHoldsADirection) {
@@ -101,20 +117,52 @@ TEST(Environment, HeedsTexelsOnTheBorder) {
       map.at(x, y)[1] = static_cast<float>(1 + std::cos(2 * kPi * x / 63.0));
     }
   }
-  const Environment heeded = make_environment(decoded(map, EnvmapAttribute::latlong));
-  const Environment ignored = make_environment(decoded(map));
-  double worst = 0, worst_ignored = 0;
-  for (int y = 0; y < 32; ++y) {
-    for (int x = 0; x < 64; ++x) {
-      const double v = (y + 0.5) / 32, u = (x + 0.5) / 64;
-      const Vec3 a = heeded.radiance.rgb(x, y), b = ignored.radiance.rgb(x, y);
-      worst = std::max({worst, std::abs(a.x - v), std::abs(a.y - 1 - std::cos(2 * kPi * u))});
-      worst_ignored =
-          std::max({worst_ignored, std::abs(b.x - v), std::abs(b.y - 1 - std::cos(2 * kPi * u))});
+  const auto worst = [](const Environment& environment) {
+    const Image& image = environment.radiance;
+    double result = 0;
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        const double v = (y + 0.5) / image.height, u = (x + 0.5) / image.width;
+        const Vec3 a = image.rgb(x, y);
+        result = std::max({result, std::abs(a.x - v), std::abs(a.y - 1 - std::cos(2 * kPi * u))});
+      }
     }
-  }
-  EXPECT_LT(worst, 2e-3);
-  EXPECT_GT(worst_ignored, 1e-2);
+    return result;
+  };
+  const Environment heeded = make_environment(decoded(map, EnvmapAttribute::latlong));
+  EXPECT_EQ(heeded.radiance.width, 128);  // twice as fine: their samples fall between ours
+  EXPECT_LT(worst(heeded), 3e-3);         // the mean over a polar texel is not its centre's value
+  EXPECT_GT(worst(make_environment(decoded(map))), 1e-2);
+  // What a client says goes before what the file says.
+  const SourceReading reading{.convention = TexelConvention::half_texel};
+  EXPECT_EQ(make_environment(decoded(map, EnvmapAttribute::latlong), reading).radiance.pixels,
+            map.pixels);
+}
+
+// Half of the sphere, and how much of it is not there.
+TEST(Environment, LeavesBlackWhatTheSourceDoesNotCover) {
+  Image dome(64, 64, 3);
+  for (float& v : dome.pixels) v = 2;
+  const Environment environment =
+      make_environment(decoded(dome), {.layout = LayoutKind::hemisphere});
+  EXPECT_NEAR(environment.covered_share, 0.5, 1e-12);
+  EXPECT_EQ(environment.radiance.width, 256);
+  EXPECT_NEAR(environment.mean.x, 1, 1e-6);
+  EXPECT_EQ(environment_radiance(environment, {0, 0.1f, 0.99f}), (Vec3{2, 2, 2}));
+  EXPECT_EQ(environment_radiance(environment, {0, -0.1f, 0.99f}), (Vec3{0, 0, 0}));
+}
+
+TEST(Environment, TurnsBySteppingColumnsWhereItCan) {
+  const Image map = reference::test_sky(32, 6);
+  const Environment still = make_environment(decoded(map), {}, yaw_rotation(360));
+  EXPECT_EQ(still.radiance.pixels, map.pixels);
+  EXPECT_TRUE(still.source.pixels.empty());
+  const Environment turned = make_environment(decoded(map), {}, yaw_rotation(90));
+  EXPECT_EQ(turned.radiance.width, map.width);
+  EXPECT_EQ(environment_radiance(turned, {0.99f, 0.1f, 0.05f}),
+            environment_radiance(still, {-0.05f, 0.1f, 0.99f}));
+  EXPECT_NEAR(turned.mean.y / still.mean.y, 1, 1e-12);
+  EXPECT_EQ(make_environment(decoded(map), {}, yaw_rotation(50)).radiance.width, 2 * map.width);
 }
 
 TEST(Environment, OpensEveryLatLongOfTheDataSet) {
