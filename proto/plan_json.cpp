@@ -132,7 +132,12 @@ std::string write_plan(const Plan& plan) {
       .member("reference_luminance", plan.reference_luminance)
       .key("prices");
   write_prices(writer, plan.prices);
-  writer.member("predicted_s", plan.predicted_s).member("pilot_s", plan.pilot_s).end_object();
+  writer.member("bias_bound", plan.bias_bound)
+      .member("predicted_s", plan.predicted_s)
+      .member("predicted_low_s", plan.predicted_low_s)
+      .member("predicted_high_s", plan.predicted_high_s)
+      .member("pilot_s", plan.pilot_s)
+      .end_object();
   return writer.take();
 }
 
@@ -166,7 +171,10 @@ Plan read_plan(std::string_view json) {
     plan.prices.push_back({price.number("error"), price.count("samples"), price.number("seconds"),
                            price.boolean("extrapolated")});
   }
+  plan.bias_bound = view.number("bias_bound");
   plan.predicted_s = view.number("predicted_s");
+  plan.predicted_low_s = view.number("predicted_low_s");
+  plan.predicted_high_s = view.number("predicted_high_s");
   plan.pilot_s = view.number("pilot_s");
   return plan;
 }
@@ -207,6 +215,7 @@ std::string write_accuracy(const AccuracyRecord& record) {
       .member("status", accuracy_status_name(record.status))
       .member("target_error", record.target_error)
       .member("error_unit", record.error_unit)
+      .member("bias_bound", record.bias_bound)
       .member("error_rms", record.error_rms)
       .member("error_max", record.error_max)
       .member("converged_share", record.converged_share)

@@ -56,6 +56,7 @@ struct AccuracyRecord {
   AccuracyStatus status = AccuracyStatus::converged;
   double target_error = 0;
   std::string error_unit;  // e.g. "95 % half-width of openness, absolute"
+  double bias_bound = 0;   // what was left out takes at the most, see Plan; 0 = nothing was
   double error_rms = 0;    // over elements
   double error_max = 0;
   double converged_share = 0;

@@ -84,23 +84,30 @@ Pilot run_pilot(const AoState& state, OpennessParameters parameters, Progress& p
 
 struct Spending {
   double mean_samples = 0;    // of all elements, those without rays included
+  double doubt = 0;           // half of a 90 % interval of that mean
   bool extrapolated = false;  // some element needs more rounds than the pilot ran
 };
 
 // What the stopping rule spends on an element for `target`, at most `cap` samples each.
 Spending spend(const Pilot& pilot, double target, uint64_t cap) {
   Spending spending;
-  double sum = 0;
+  RunningMoments samples;
   for (size_t e = 0; e < pilot.elements; ++e) {
     // Only elements without rays have no error at all.
-    if (pilot.errors.empty() || pilot.errors[0][e] == 0) continue;
+    if (pilot.errors.empty() || pilot.errors[0][e] == 0) {
+      samples.add(0);
+      continue;
+    }
     ErrorCurve curve{kFirstSamples, {}, pilot.slope};
     for (const std::vector<double>& round : pilot.errors) curve.errors.push_back(round[e]);
     const Stop stop = stop_of(curve, look_quantile, target, kFirstSamples, cap);
     spending.extrapolated |= stop.extrapolated;
-    sum += static_cast<double>(std::min(stop.samples, cap));
+    samples.add(static_cast<double>(std::min(stop.samples, cap)));
   }
-  if (pilot.elements > 0) spending.mean_samples = sum / static_cast<double>(pilot.elements);
+  spending.mean_samples = samples.mean;
+  // Neighbours are alike, so a group counts as two elements.
+  const double independent = 2 * static_cast<double>(pilot.elements) / kPilotGroupSize;
+  if (independent > 1) spending.doubt = 1.645 * std::sqrt(samples.variance() / independent);
   return spending;
 }
 
@@ -216,7 +223,13 @@ void price(const AoState& state, const Pilot& pilot, Plan* plan) {
                                short_number(*limit) + " seconds that max_seconds allows.");
   }
   plan->min_samples = std::min(kFirstSamples, plan->max_samples);
-  plan->predicted_s = predict_seconds(pilot, plan->elements, target, plan->max_samples);
+  const Spending order = spend(pilot, target, plan->max_samples);
+  const double seconds_per_sample = static_cast<double>(plan->elements) * pilot.seconds_per_ray;
+  plan->predicted_s = order.mean_samples * seconds_per_sample;
+  // All elements in the pilot leave no doubt.
+  const double doubt = plan->elements > pilot.elements ? order.doubt : 0;
+  plan->predicted_low_s = std::max(0.0, order.mean_samples - doubt) * seconds_per_sample;
+  plan->predicted_high_s = (order.mean_samples + doubt) * seconds_per_sample;
   const auto elements = static_cast<double>(plan->elements);
   for (const double error : kQuotedErrors) {
     // No limit of samples: a price says what the error needs.

@@ -15,7 +15,8 @@ using ProbesHandle = std::unique_ptr<ProbesState, ProbesStateDeleter>;
 void refuse_faults(const Spec& spec) {
   const std::vector<SpecFault> faults = validate(spec);
   if (!faults.empty())
-    throw Error(ErrorCode::invalid_spec, faults.front().message, faults.front().pointer);
+    throw Error(faults.front().code == "too_large" ? ErrorCode::too_large : ErrorCode::invalid_spec,
+                faults.front().message, faults.front().pointer);
 }
 
 std::variant<AoHandle, EnvironmentMapsHandle, ProbesHandle> open(const Spec& spec,

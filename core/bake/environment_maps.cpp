@@ -191,6 +191,7 @@ Plan environment_maps_plan(EnvironmentMapsState& state, Progress& progress) {
   plan.prices = list_prices(state, speed);
   plan.predicted_s =
       speed * model_seconds(state.light, state.outputs, state.spec.accuracy.check_texels);
+  plan.predicted_low_s = plan.predicted_high_s = plan.predicted_s;
   plan.chunks = split_chunks(plan.elements, plan.predicted_s * threads, state.grants.chunk_seconds);
   plan.pilot_s = wall_seconds() - start_s;
   return plan;

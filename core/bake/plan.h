@@ -47,7 +47,13 @@ struct Plan {
   int max_bounces = 0;
   double reference_luminance = 0;  // probes: the job's mean luminance from the pilot; 1 otherwise
   std::vector<Price> prices;       // for kQuotedErrors
-  double predicted_s = 0;          // wall seconds of baking as ordered
+  // What the effects left out as negligible and the bounces past the last take from a result at the
+  // most, in the unit of target_error. Up to a fifth of target_error it is part of the order: the
+  // rest is what is left for noise. Above that it stands beside the error, and a warning says so.
+  double bias_bound = 0;
+  double predicted_s = 0;      // wall seconds of baking as ordered
+  double predicted_low_s = 0;  // a 90 % interval around it, on a machine as busy as the pilot's
+  double predicted_high_s = 0;
   double pilot_s = 0;
 };
 

@@ -45,13 +45,6 @@ double reference_sample(const RadianceScene& scene, const Vec3& origin, const Ve
   return luminance(to_double(sum));
 }
 
-Vec3 uniform_direction(const Point2& u) {
-  const double z = 1 - 2 * static_cast<double>(u.x);
-  const double r = std::sqrt(std::max(0.0, 1 - z * z));
-  const double phi = 2 * kPi * static_cast<double>(u.y);
-  return to_float({r * std::cos(phi), r * std::sin(phi), z});
-}
-
 }  // namespace
 
 std::vector<uint64_t> pilot_probes(const ProbesState& state) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/base/random.h"
+#include "core/base/pinned_math.h"
 #include "core/sphere/direction_map.h"
 
 namespace lightkiln {
@@ -15,15 +15,15 @@ constexpr double kTouchingDistance = 1e-4;  // of the scene's longest side
 constexpr double kTouchingShare = 0.1;
 constexpr double kInsideShare = 0.25;
 
-// Uniform over the sphere: z and azimuth are uniform (Archimedes).
+}  // namespace
+
+// z and azimuth are uniform (Archimedes).
 Vec3 uniform_direction(const Point2& u) {
   const double z = 1 - 2 * static_cast<double>(u.x);
   const double r = std::sqrt(std::max(0.0, 1 - z * z));
-  const double phi = 2 * kPi * static_cast<double>(u.y);
-  return to_float({r * std::cos(phi), r * std::sin(phi), z});
+  const SinCos around = pinned_sin_cos(2 * kPi * static_cast<double>(u.y));
+  return to_float({r * around.cos, r * around.sin, z});
 }
-
-}  // namespace
 
 ProbeSurroundings probe_surroundings(const Tracer& tracer, const Vec3& origin, uint64_t key,
                                      RayCounters& counters) {

@@ -6,9 +6,13 @@
 #include <vector>
 
 #include "core/bake/bake.h"
+#include "core/base/random.h"
 #include "core/trace/tracer.h"
 
 namespace lightkiln {
+
+// Uniform over the sphere for points uniform in the square.
+Vec3 uniform_direction(const Point2& u);
 
 struct ProbeSurroundings {
   ProbeStatus status = ProbeStatus::valid;

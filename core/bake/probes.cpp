@@ -52,6 +52,11 @@ EffectSelection plan_selection(const ProbesState& state, const Plan& plan) {
                       state.order(plan.reference_luminance));
 }
 
+double noise_target(const ProbesState& state, const Plan& plan) {
+  const double target = target_error(state.spec);
+  return plan.bias_bound <= kBiasShare * target ? target - plan.bias_bound : target;
+}
+
 namespace {
 
 // Progress inside one probe, whose number of rounds is not known beforehand: the share of samples
@@ -76,7 +81,7 @@ ProbeResult bake_probe(ProbesState& state, const RadianceScene& scene, const Cub
                        const Plan& plan, uint64_t probe, Progress& progress, double progress_begin,
                        double progress_width, ChunkReport* report) {
   const ProbesParameters& parameters = state.parameters();
-  const double target = target_error(state.spec);
+  const double target = noise_target(state, plan);
   const double wall = wall_seconds(), cpu = process_cpu_seconds();
   const Vec3 origin = state.origin(probe);
   const uint64_t key = state.key(kBakeStream, probe);
@@ -94,7 +99,9 @@ ProbeResult bake_probe(ProbesState& state, const RadianceScene& scene, const Cub
     const double next = 0.5 * (1 + done);
     Round round = sampling.advance(progress, progress_begin + progress_width * done,
                                    progress_begin + progress_width * next);
-    result.error = sampling.error().bound(kLookConfidence) / plan.reference_luminance;
+    // As exact as a float: the quantile's last bits depend on the C library.
+    const double bound = sampling.error().bound(kLookConfidence) / plan.reference_luminance;
+    result.error = static_cast<double>(static_cast<float>(bound));
     round.error_sum_sq = result.error * result.error;
     round.error_max = result.error;
     reached = result.error <= target;
@@ -116,7 +123,7 @@ ProbeResult bake_probe(ProbesState& state, const RadianceScene& scene, const Cub
     result.sh_error = kProjectionTolerance;
   } else {
     result.sh = sampling.harmonics();
-    result.sh_error = sampling.harmonics_error();
+    result.sh_error = static_cast<double>(static_cast<float>(sampling.harmonics_error()));
   }
   for (size_t i = 0; i < texels.texels.size(); ++i) {
     const Vec3 rgb = sampling.texel(i);

@@ -80,7 +80,7 @@ Assembly probes_assemble(ProbesState& state, const Plan& plan, std::span<const C
   for (size_t i = 0; i < chunks.size(); ++i) {
     ByteReader reader(chunks[i].bytes);
     for (uint64_t p = 0; p < plan.chunks[i].count; ++p) {
-      ProbeResult result = read_probe(reader, parameters);
+      ProbeResult result = read_probe(reader, parameters, plan.chunks[i].first + p);
       const Vec3d& position = parameters.positions.at(result.index);
       document.probes.push_back(describe(result, position));
       const ProbeDocument& described = document.probes.back();
@@ -96,12 +96,15 @@ Assembly probes_assemble(ProbesState& state, const Plan& plan, std::span<const C
       progress.update(static_cast<double>(document.probes.size()) /
                       static_cast<double>(plan.elements));
     }
+    if (!reader.at_end())
+      throw Error(ErrorCode::internal, "A chunk's bytes go on after its last probe.");
     reports.push_back(chunks[i].report);
   }
   assembly.accuracy =
       summarise_accuracy(reports, target, plan.predicted_s,
                          "95 % bound on the cube's error: texel luminance, root mean square over "
                          "the sphere, relative to the job's mean luminance");
+  assembly.accuracy.bias_bound = plan.bias_bound;
   assembly.document = std::move(document);
   return assembly;
 }

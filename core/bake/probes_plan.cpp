@@ -27,13 +27,14 @@ void take_effects(EffectPlan&& decided, Plan* plan) {
   }
   plan->warnings.insert(plan->warnings.end(), decided.warnings.begin(), decided.warnings.end());
   plan->max_bounces = decided.selection.max_bounces;
+  plan->bias_bound = decided.bias_bound;
 }
 
-// The grant counts rays of a texel here: a texel is what a probe's samples are counted by.
+// Rays of a texel: a texel is what a probe's samples are counted by.
 uint64_t most_samples(const ProbesState& state, const Plan& plan) {
   const double rays_each = 1 + 3 * (plan.max_bounces + 1.0);
-  const double granted = static_cast<double>(state.grants.max_rays_per_element) / rays_each;
-  const auto affordable = std::bit_floor(static_cast<uint64_t>(std::max(granted, 1.0)));
+  const double allowed = static_cast<double>(kMostRaysPerElement) / rays_each;
+  const auto affordable = std::bit_floor(static_cast<uint64_t>(std::max(allowed, 1.0)));
   return std::max(kFewestSamples, std::min(max_samples(state.spec), affordable));
 }
 
@@ -59,9 +60,11 @@ void price(const ProbesState& state, const std::vector<ProbePilot>& pilots, Plan
                                "allows.");
     }
   }
-  const Forecast order = forecast(pilots, plan->elements, target_error(state.spec),
+  const Forecast order = forecast(pilots, plan->elements, noise_target(state, *plan),
                                   plan->min_samples, plan->max_samples);
   plan->predicted_s = order.seconds;
+  plan->predicted_low_s = order.low_s;
+  plan->predicted_high_s = order.high_s;
   for (const double error : kQuotedErrors) {
     // No limit of samples: a price says what the error needs.
     const Forecast quoted =

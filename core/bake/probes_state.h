@@ -42,6 +42,9 @@ inline constexpr uint64_t kPilotStream = 2;
 // The selection that a plan stands for.
 EffectSelection plan_selection(const ProbesState& state, const Plan& plan);
 
+// What of the ordered error is left for noise.
+double noise_target(const ProbesState& state, const Plan& plan);
+
 // One probe's result, as chunk bytes carry it.
 struct ProbeResult {
   uint64_t index = 0;
@@ -55,6 +58,7 @@ struct ProbeResult {
   std::vector<float> distance;  // stacked cube, world units, 0 = nothing hit
 };
 void write_probe(const ProbeResult& result, ByteWriter& writer);
-ProbeResult read_probe(ByteReader& reader, const ProbesParameters& parameters);
+// Throws Error{internal} for bytes that are not the result of probe `index`.
+ProbeResult read_probe(ByteReader& reader, const ProbesParameters& parameters, uint64_t index);
 
 }  // namespace lightkiln

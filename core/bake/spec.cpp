@@ -39,13 +39,20 @@ uint64_t max_samples(const Spec& spec) {
   return std::bit_ceil(spec.accuracy.max_samples.value_or(65536));
 }
 
+uint64_t probe_bytes(const ProbesParameters& parameters) {
+  const auto size = static_cast<uint64_t>(parameters.cubemap.size);
+  const auto bands = static_cast<uint64_t>(parameters.sh.bands);
+  return 6 * size * size * 16 + bands * bands * 24;
+}
+
 namespace {
 
 // Collects faults; each check reads as one sentence of the contract.
 class Checker {
  public:
-  void fault(std::string pointer, std::string code, std::string message) {
-    faults_.push_back({std::move(pointer), std::move(code), std::move(message)});
+  void fault(std::string pointer, std::string code, std::string message, std::string allowed = "") {
+    faults_.push_back(
+        {std::move(pointer), std::move(code), std::move(message), std::move(allowed)});
   }
   void positive(const std::optional<double>& value, const std::string& pointer,
                 const std::string& name) {
@@ -161,6 +168,19 @@ void check_environment_maps(const EnvironmentMapsParameters& p, Checker& checker
                       " levels: each is half the one before and the last is at least 1.");
 }
 
+// What can be held is told by the number of positions, whose cubes the other parameters size.
+void check_probe_bytes(const ProbesParameters& p, Checker& checker) {
+  const uint64_t each = probe_bytes(p), most = kMostProbeBytes / each;
+  if (p.positions.size() <= most) return;
+  const std::string size = std::to_string(p.cubemap.size);
+  checker.fault("/parameters/positions", "too_large",
+                std::to_string(p.positions.size()) + " probes with cubes of " + size +
+                    " texels a side take " + std::to_string(p.positions.size() * each) +
+                    " bytes; allowed are " + std::to_string(kMostProbeBytes) + ", which is " +
+                    std::to_string(most) + " such probes an order.",
+                "at most " + std::to_string(most) + " positions at cubemap.size " + size);
+}
+
 void check_probes(const ProbesParameters& p, Checker& checker) {
   constexpr size_t kMostPositions = 10000;
   if (p.positions.empty() || p.positions.size() > kMostPositions)
@@ -177,6 +197,9 @@ void check_probes(const ProbesParameters& p, Checker& checker) {
   }
   checker.between(p.cubemap.size, 1, 512, "/parameters/cubemap/size", "size");
   checker.between(p.sh.bands, 1, 33, "/parameters/sh/bands", "bands");
+  const bool sized = p.cubemap.size >= 1 && p.cubemap.size <= 512 && p.sh.bands >= 1;
+  if (sized && p.sh.bands <= 33 && p.positions.size() <= kMostPositions)
+    check_probe_bytes(p, checker);
   if (p.max_bounces)
     checker.between(*p.max_bounces, 0, 64, "/parameters/max_bounces", "max_bounces");
 }

@@ -84,7 +84,8 @@ struct ProbeShOutput {
 };
 
 struct ProbesParameters {
-  std::vector<Vec3d> positions;  // world units, 1..10000 positions
+  // World units, 1..10000 positions; fewer where cubes are large: see kMostProbeBytes.
+  std::vector<Vec3d> positions;
   CubemapOutput cubemap;
   ProbeShOutput sh;
   // Diffuse bounces, 0..64: 0 = only light that surfaces emit or the environment sends directly to
@@ -136,10 +137,19 @@ double target_error(const Spec& spec);
 // Of kinds that take samples.
 uint64_t max_samples(const Spec& spec);
 
+// Limits of the engine, the same under every operator, so that equal orders have equal results.
+// Rays that one element may cost, whatever was ordered.
+inline constexpr uint64_t kMostRaysPerElement = 1u << 26;
+// Bytes that all probes of an order may hold in memory: see probe_bytes.
+inline constexpr uint64_t kMostProbeBytes = 1u << 30;
+// One probe: 16 bytes a texel of its cube (radiance and distance), 24 a coefficient of its
+// harmonics.
+uint64_t probe_bytes(const ProbesParameters& parameters);
+
 // A fault of a spec at a JSON pointer relative to the spec's root.
 struct SpecFault {
   std::string pointer;
-  std::string code;             // missing | unknown | type | range | conflict | duplicate | syntax
+  std::string code;  // missing | unknown | type | range | too_large | conflict | duplicate | syntax
   std::string message;          // one sentence: what is wrong and what is allowed
   std::string allowed = {};     // the values or the range that would do; "" = not said
   std::string suggestion = {};  // the nearest known name; "" = none is near
@@ -155,9 +165,6 @@ struct Grants {
   // its process. It bounds nothing else; the process needs a limit of its own. 0 = no limit.
   uint64_t max_memory_bytes = 0;
   double chunk_seconds = 4.0;  // work aimed at per chunk
-  // Rays that one element may cost, whatever was ordered. A limit of the engine and not a grant, so
-  // that equal orders have equal results under every operator.
-  static constexpr uint64_t max_rays_per_element = 1u << 26;
 };
 
 }  // namespace lightkiln

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "core/base/pinned_math.h"
 #include "core/sphere/direction_map.h"
 #include "core/sphere/solid_angle.h"
 
@@ -73,8 +74,8 @@ EnvironmentSampler::Sample EnvironmentSampler::sample(float u, float v) const {
   if (black_) {
     const double cosine = 1 - 2 * static_cast<double>(v);
     const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
-    const double longitude = 2 * kPi * static_cast<double>(u);
-    return {to_float(Vec3d{sine * std::sin(longitude), cosine, sine * std::cos(longitude)}), Vec3{},
+    const SinCos around = pinned_sin_cos(2 * kPi * static_cast<double>(u));
+    return {to_float(Vec3d{sine * around.sin, cosine, sine * around.cos}), Vec3{},
             static_cast<float>(1 / (4 * kPi))};
   }
   const int y = find_interval(row_cdf_.data(), image.height, v);
@@ -95,14 +96,14 @@ EnvironmentSampler::Sample EnvironmentSampler::sample(float u, float v) const {
   const bool south = 2 * y >= image.height;
   const double near_pole = south ? kPi - top : top, far_pole = south ? kPi - bottom : bottom;
   const auto versine_half = [](double angle) {
-    const double s = std::sin(angle / 2);
+    const double s = pinned_sin_cos(angle / 2).sin;
     return s * s;
   };
   const double half = versine_half(near_pole) * (1 - fy) + versine_half(far_pole) * fy;
   const double sine = 2 * std::sqrt(half * (1 - half));
   const double cosine = (south ? -1 : 1) * (1 - 2 * half);
-  const double longitude = kPi * (1 - 2 * (x + fx) / image.width);
-  const Vec3d direction{sine * std::sin(longitude), cosine, sine * std::cos(longitude)};
+  const SinCos around = pinned_sin_cos(kPi * (1 - 2 * (x + fx) / image.width));
+  const Vec3d direction{sine * around.sin, cosine, sine * around.cos};
   return {to_float(direction), image.rgb(x, y), static_cast<float>(texel_pdf(x, y))};
 }
 

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "core/base/pinned_math.h"
+
 namespace lightkiln {
 
 namespace {
@@ -30,18 +32,18 @@ Vec3d latlong_direction(double u, double v) {
   // Longitude pi at the left edge, -pi at the right one; latitude pi/2 at the top.
   const double longitude = kPi * (1 - 2 * u);
   const double colatitude = kPi * v;
-  const double sine = std::sin(colatitude);
-  return {sine * std::sin(longitude), std::cos(colatitude), sine * std::cos(longitude)};
+  const SinCos down = pinned_sin_cos(colatitude), around = pinned_sin_cos(longitude);
+  return {down.sin * around.sin, down.cos, down.sin * around.cos};
 }
 
 void latlong_coordinates(const Vec3d& direction, double* u, double* v) {
-  const double horizontal = std::hypot(direction.x, direction.z);
-  const double longitude = horizontal > 0 ? std::atan2(direction.x, direction.z) : 0;
+  const double horizontal = std::sqrt(direction.x * direction.x + direction.z * direction.z);
+  const double longitude = pinned_atan2(direction.x, direction.z);
   const double wrapped = 0.5 - longitude / (2 * kPi);
   // Longitude -pi is the same meridian as pi, which is u = 0.
   *u = wrapped < 1 ? std::max(wrapped, 0.0) : 0.0;
   // atan2 keeps full accuracy at the poles, where asin(y) loses half the digits.
-  *v = std::clamp(std::atan2(horizontal, direction.y) / kPi, 0.0, 1.0);
+  *v = std::clamp(pinned_atan2(horizontal, direction.y) / kPi, 0.0, 1.0);
 }
 
 Vec3d cube_direction(int face, double s, double t) {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/base/pinned_math.h"
 #include "core/sphere/direction_map.h"
 
 namespace lightkiln {
@@ -10,7 +11,7 @@ namespace {
 
 // The solid angle of the rectangle [0, x] x [0, y] at distance 1: atan(x y / sqrt(x^2 + y^2 + 1)).
 double corner_solid_angle(double x, double y) {
-  return std::atan2(x * y, std::sqrt(x * x + y * y + 1));
+  return pinned_atan2(x * y, std::sqrt(x * x + y * y + 1));
 }
 
 }  // namespace
@@ -31,7 +32,7 @@ double cube_texel_solid_angle(int x, int y, int size) {
 // which does not cancel at the poles.
 double latlong_texel_solid_angle(int y, int width, int height) {
   const double middle = kPi * (y + 0.5) / height;
-  return 4 * kPi / width * std::sin(middle) * std::sin(kPi / (2.0 * height));
+  return 4 * kPi / width * pinned_sin_cos(middle).sin * pinned_sin_cos(kPi / (2.0 * height)).sin;
 }
 
 // With d = t1 - t0 and t the row's middle, the direction's part along the equator integrates to
@@ -51,7 +52,7 @@ Vec3d latlong_texel_moment(int x, int y, int width, int height) {
 }
 
 double cap_solid_angle(double half_angle_rad) {
-  const double s = std::sin(half_angle_rad / 2);
+  const double s = pinned_sin_cos(half_angle_rad / 2).sin;
   return 4 * kPi * s * s;
 }
 

@@ -68,7 +68,7 @@ class RelativeBounds {
 
 int fewest_bounces(const LightSurvey& survey, const EffectOrder& order) {
   for (int k = 0; k < kMostBounces; ++k) {
-    if (truncation_bound(survey, order, k) <= 0.5 * order.target_error) return k;
+    if (truncation_bound(survey, order, k) <= kTruncationShare * order.target_error) return k;
   }
   return kMostBounces;
 }
@@ -79,9 +79,11 @@ void choose_halvings(const LightSurvey& survey, EffectSelection* selection) {
   const double albedo = survey.mean_albedo;
   for (int i = 0; i < kMostHalvings; ++i) {
     if (!(albedo > 0) || albedo >= 1) continue;
-    const double depth = (i + 1) * std::log(0.5) / std::log(albedo);
-    selection->halving[i] =
-        std::max(i + 2, static_cast<int>(std::ceil(std::min<double>(depth, kMostBounces))));
+    int depth = 0;
+    for (double left = 1; depth < kMostBounces && left > std::exp2(-(i + 1)); ++depth) {
+      left *= albedo;
+    }
+    selection->halving[i] = std::max(i + 2, depth);
   }
 }
 
@@ -113,6 +115,7 @@ class Decision {
           what + ", but changes no result by more than " + short_number(bound) + ", under " +
               short_number(100 * kNegligibleShare) + " % of the ordered error.",
           bound);
+      plan_.bias_bound += bound;
     } else {
       add(name, true, what + ".", bound);
     }
@@ -201,6 +204,7 @@ class Decision {
     int k = order_.max_bounces ? *order_.max_bounces : fewest_bounces(survey_, order_);
     const double left = truncation_bound(survey_, order_, k);
     plan_.truncation_bound = left;
+    if (!order_.max_bounces) plan_.bias_bound = std::min(plan_.bias_bound + left, kBoundCeiling);
     plan_.selection.max_bounces = k;
     const std::string albedo = "the largest albedo is " + short_number(survey_.max_albedo);
     std::string reason;
@@ -213,10 +217,10 @@ class Decision {
                ", so that later ones add at most " + short_number(left) + ".";
     }
     add("diffuse_bounces", k > 0, std::move(reason), k > 0 ? bounds_.reflected() : left);
-    if (!order_.max_bounces && left > 0.5 * order_.target_error) {
+    if (!order_.max_bounces && left > kTruncationShare * order_.target_error) {
       plan_.warnings.push_back("Bounces end at " + std::to_string(kMostBounces) +
                                ", where the bound on what is lost (" + short_number(left) +
-                               ") is above half of the ordered error: the largest albedo is " +
+                               ") is above a tenth of the ordered error: the largest albedo is " +
                                short_number(survey_.max_albedo) + ".");
     }
   }
@@ -287,8 +291,9 @@ EffectSelection selection_of(const std::vector<EffectReason>& reasons, int max_b
   const RelativeBounds bounds(survey, order);
   if (!order.max_bounces && survey.max_albedo < 1 && bounds.irradiance() > 0) {
     const double reference = order.reference_luminance > 0 ? order.reference_luminance : 1;
-    selection.throughput_floor = static_cast<float>(0.5 * order.target_error * reference *
-                                                    (1 - survey.max_albedo) / bounds.irradiance());
+    selection.throughput_floor =
+        static_cast<float>(kTruncationShare * order.target_error * reference *
+                           (1 - survey.max_albedo) / bounds.irradiance());
   }
   return selection;
 }

@@ -23,7 +23,12 @@ inline constexpr int kMostBounces = 64;
 inline constexpr int kMostHalvings = 4;
 inline constexpr double kBoundCeiling = 1e6;
 // A light whose bound is under this share of the ordered error is left out.
-inline constexpr double kNegligibleShare = 0.05;
+inline constexpr double kNegligibleShare = 0.02;
+// Bounces end where what lies behind them is under this share of the ordered error.
+inline constexpr double kTruncationShare = 0.1;
+// What both leave out together at the most: five kinds of light, and late bounces. An order whose
+// bias cannot be kept under it (see EffectPlan::bias_bound) says so in a warning.
+inline constexpr double kBiasShare = 5 * kNegligibleShare + kTruncationShare;
 
 struct EffectOrder {
   std::optional<int> max_bounces;  // none = by bound
@@ -65,6 +70,9 @@ struct EffectPlan {
   std::vector<EffectReason> reasons;
   std::vector<std::string> warnings;
   double truncation_bound = 0;  // of the bounces chosen
+  // What the choices made here take from a result at the most: lights left out as negligible and,
+  // unless max_bounces was ordered, bounces past the last. What was ordered is no bias.
+  double bias_bound = 0;
 };
 
 EffectPlan decide_effects(const LightSurvey& survey, const EffectOrder& order);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/pinned_math.h"
+
 namespace lightkiln {
 
 PunctualLights::PunctualLights(const Scene& scene, const EffectSelection& selection)
@@ -20,8 +22,8 @@ PunctualLights::PunctualLights(const Scene& scene, const EffectSelection& select
                 0,
                 0};
     if (light.kind == LightKind::spot) {
-      const double outer = std::cos(light.outer_cone_rad);
-      entry.cone_scale = 1 / std::max(0.001, std::cos(light.inner_cone_rad) - outer);
+      const double outer = pinned_sin_cos(light.outer_cone_rad).cos;
+      entry.cone_scale = 1 / std::max(0.001, pinned_sin_cos(light.inner_cone_rad).cos - outer);
       entry.cone_offset = -outer * entry.cone_scale;
     }
     lights_.push_back(entry);

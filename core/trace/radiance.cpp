@@ -5,6 +5,7 @@
 #include <bit>
 #include <utility>
 
+#include "core/base/pinned_math.h"
 #include "core/base/random.h"
 
 namespace lightkiln {
@@ -37,8 +38,8 @@ float power_heuristic(float p, float q) {
 // density cos(theta) / pi per steradian (Malley). Polar mapping.
 Vec3 cosine_hemisphere(float u, float v) {
   const float r = std::sqrt(u);
-  const float phi = static_cast<float>(2 * kPi) * v;
-  return {r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u)};
+  const SinCos around = pinned_sin_cos(2 * kPi * static_cast<double>(v));
+  return {r * static_cast<float>(around.cos), r * static_cast<float>(around.sin), std::sqrt(1 - u)};
 }
 
 // The power heuristic's weight p^2 / (p^2 + q^2) of light found with density p, times q / p, so

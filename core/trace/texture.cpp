@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/base/pinned_math.h"
 #include "core/image/ldr.h"
 
 namespace lightkiln {
@@ -85,8 +86,8 @@ Vec2 transform_texcoord(const TextureSlot& slot, const Vec2& uv) {
   const float u = slot.scale.x * uv.x;
   const float v = slot.scale.y * uv.y;
   if (slot.rotation_rad == 0) return {slot.offset.x + u, slot.offset.y + v};
-  const float c = std::cos(slot.rotation_rad);
-  const float s = std::sin(slot.rotation_rad);
+  const SinCos turned = pinned_sin_cos(static_cast<double>(slot.rotation_rad));
+  const auto c = static_cast<float>(turned.cos), s = static_cast<float>(turned.sin);
   return {slot.offset.x + c * u + s * v, slot.offset.y - s * u + c * v};
 }
 

@@ -78,6 +78,7 @@ function billOf(accuracy) {
       ["Actual", `${format.seconds(accuracy.actual_s)}, ${format.seconds(accuracy.cpu_s)} of CPU`],
       ["Error", `${format.error(accuracy.error_rms)} rms, ${format.error(accuracy.error_max)} at worst`],
       ["Error is", accuracy.error_unit],
+      ["Left out", accuracy.bias_bound > 0 ? `at most ${format.error(accuracy.bias_bound)}` : ""],
     ]),
   ];
 }

@@ -93,6 +93,10 @@ TEST(ProbesJob, AccuracyCountsWhatWasTraced) {
   EXPECT_EQ(accuracy.converged_share, 1);
   EXPECT_EQ(accuracy.target_error, 0.01);
   EXPECT_EQ(accuracy.predicted_s, plan.predicted_s);
+  EXPECT_LE(plan.predicted_low_s, plan.predicted_s);
+  EXPECT_GE(plan.predicted_high_s, plan.predicted_s);
+  EXPECT_EQ(accuracy.bias_bound, plan.bias_bound);
+  EXPECT_LE(accuracy.error_max + accuracy.bias_bound, accuracy.target_error);
   ASSERT_FALSE(accuracy.rounds.empty());
   EXPECT_EQ(accuracy.rounds[0].samples, 64u);
   EXPECT_EQ(accuracy.counters.shadow_rays, 0u);
@@ -101,6 +105,34 @@ TEST(ProbesJob, AccuracyCountsWhatWasTraced) {
   for (const Round& round : accuracy.rounds) rays += round.rays;
   // Beside the rounds, each probe looks around with 1024 rays and once through each texel.
   EXPECT_EQ(accuracy.counters.nearest_rays + accuracy.counters.bounce_rays, rays + 3 * (1024 + 96));
+}
+
+// Results that no process could hold are refused before anything is loaded.
+TEST(ProbesJob, MoreThanMemoryHoldsIsTooLarge) {
+  Job job;
+  auto& parameters = std::get<ProbesParameters>(job.spec.parameters);
+  parameters.cubemap.size = 512;
+  const uint64_t most = kMostProbeBytes / probe_bytes(parameters);
+  EXPECT_EQ(most, 42u);
+  parameters.positions.assign(most, {0, 0, 0});
+  EXPECT_TRUE(validate(job.spec).empty());
+  for (const size_t count : {size_t{43}, size_t{10000}}) {
+    parameters.positions.assign(count, {0, 0, 0});
+    const std::vector<SpecFault> faults = validate(job.spec);
+    ASSERT_EQ(faults.size(), 1u);
+    EXPECT_EQ(faults[0].pointer, "/parameters/positions");
+    EXPECT_EQ(faults[0].code, "too_large");
+    EXPECT_NE(faults[0].allowed.find("at most 42 positions"), std::string::npos);
+    try {
+      job.bake();
+      FAIL() << count;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::too_large);
+      EXPECT_EQ(error.where(), "/parameters/positions");
+    }
+  }
+  parameters.cubemap.size = 64;
+  EXPECT_EQ(kMostProbeBytes / probe_bytes(parameters), 2729u);
 }
 
 TEST(ProbesJob, SameOrderSameBytes) {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -51,7 +52,9 @@ State open(const SceneData& data, std::optional<Environment> environment, const 
 std::vector<ProbeResult> read_all(const ProbesState& state, const ChunkResult& chunk) {
   ByteReader reader(chunk.bytes);
   std::vector<ProbeResult> results;
-  while (!reader.at_end()) results.push_back(read_probe(reader, state.parameters()));
+  while (!reader.at_end()) {
+    results.push_back(read_probe(reader, state.parameters(), results.size()));
+  }
   return results;
 }
 
@@ -145,6 +148,72 @@ TEST(Probes, FurnaceStaysExactThroughThinnedBounces) {
   for (size_t c = 1; c < 9; ++c) {
     EXPECT_NEAR(probe.sh.coefficients[c].y, 0, 2 * kFirst * 2 * probe.sh_error) << c;
   }
+}
+
+// A closed room saturates the bound on late bounces: L = 2 but for what they would have added. That
+// loss is no noise, so it stands in bias_bound, and noise is left the rest of the order.
+TEST(Probes, WhatBouncesLeaveOutIsPartOfTheOrder) {
+  for (const double target : {0.5, 0.05}) {
+    Order order;
+    order.size = 2;
+    order.target = target;
+    State state = open(room(0.5f, 1), {}, order);
+    const Baked baked = bake(state);
+    const double lost = 1 - std::pow(0.5, baked.plan.max_bounces + 1);
+    EXPECT_GT(baked.plan.bias_bound, 0);
+    EXPECT_LE(baked.plan.bias_bound, kBiasShare * target);
+    EXPECT_EQ(noise_target(*state, baked.plan), target - baked.plan.bias_bound);
+    const ProbeResult& probe = baked.probes.at(0);
+    EXPECT_EQ(probe.accuracy, AccuracyStatus::converged);
+    EXPECT_LE(probe.error + baked.plan.bias_bound, target);
+    for (const float value : probe.radiance) {
+      EXPECT_NEAR(value, 2 * lost, 1e-4);
+      EXPECT_LE((2 - value) / baked.plan.reference_luminance, baked.plan.bias_bound * 1.001);
+    }
+  }
+  // A white room keeps no such promise and says so.
+  Order order;
+  order.size = 1;
+  order.max_samples = 64;
+  State state = open(room(1, 1), {}, order);
+  const Baked baked = bake(state);
+  EXPECT_GT(baked.plan.bias_bound, 0.05);
+  EXPECT_EQ(noise_target(*state, baked.plan), 0.05);
+  EXPECT_FALSE(baked.plan.warnings.empty());
+}
+
+TEST(Probes, TornChunksAreRefused) {
+  Order order;
+  order.size = 2;
+  order.max_bounces = 0;
+  order.positions = {{0, 0, 0}, {0.1, 0, 0}};
+  State state = open(room(0.5f, 1), {}, order);
+  Progress progress;
+  Plan plan = probes_plan(*state, progress);
+  plan.chunks = {{0, 2}};
+  const ChunkResult whole = probes_chunk(*state, plan, {0, 2}, progress);
+  EXPECT_NO_THROW(probes_assemble(*state, plan, std::span(&whole, 1), progress));
+  const auto refused = [&](const std::function<void(std::vector<std::byte>&)>& tear) {
+    ChunkResult torn = whole;
+    tear(torn.bytes);
+    try {
+      probes_assemble(*state, plan, std::span(&torn, 1), progress);
+      return false;
+    } catch (const Error& error) {
+      return error.code() == ErrorCode::internal;
+    }
+  };
+  EXPECT_TRUE(refused([](auto& bytes) { bytes.pop_back(); }));
+  EXPECT_TRUE(refused([](auto& bytes) { bytes.push_back(std::byte{0}); }));
+  EXPECT_TRUE(refused([](auto& bytes) { bytes.clear(); }));
+  EXPECT_TRUE(refused([](auto& bytes) { bytes[0] = std::byte{1}; }));      // index
+  EXPECT_TRUE(refused([](auto& bytes) { bytes[8] = std::byte{9}; }));      // status
+  EXPECT_TRUE(refused([](auto& bytes) { bytes[19] = std::byte{0xff}; }));  // a share
+  EXPECT_TRUE(refused([](auto& bytes) { std::fill_n(bytes.end() - 4, 4, std::byte{0xff}); }));
+  // Torn in the middle and joined again.
+  EXPECT_TRUE(refused([](auto& bytes) { bytes.erase(bytes.begin() + 100, bytes.begin() + 108); }));
+  const ChunkResult second = probes_chunk(*state, plan, {1, 1}, progress);
+  EXPECT_TRUE(refused([&](auto& bytes) { bytes = second.bytes; }));
 }
 
 TEST(Probes, EmptySceneIsTheEnvironment) {

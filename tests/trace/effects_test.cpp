@@ -248,15 +248,34 @@ TEST(Effects, EveryEffectIsListedWithReasonAndBound) {
   }
 }
 
-TEST(Effects, FewestBouncesWhoseBoundIsUnderHalfTheOrder) {
+TEST(Effects, FewestBouncesWhoseBoundIsUnderATenthOfTheOrder) {
   const LitScene lit(plain_scene(), constant_environment({1, 1, 1}), bounces(1));
   for (const double target : {0.3, 0.1, 0.01, 0.001}) {
     const EffectPlan plan = decide_effects(lit.survey, {std::nullopt, target, 0.8});
     const int k = plan.selection.max_bounces;
     // R rho^(k+1) / (1 - rho) / reference with rho = 0.5, R = 1.
-    EXPECT_LE(std::pow(0.5, k + 1) / 0.5 / 0.8, 0.5 * target);
-    EXPECT_GT(std::pow(0.5, k) / 0.5 / 0.8, 0.5 * target);
+    EXPECT_LE(std::pow(0.5, k + 1) / 0.5 / 0.8, kTruncationShare * target);
+    EXPECT_GT(std::pow(0.5, k) / 0.5 / 0.8, kTruncationShare * target);
   }
+}
+
+// What is left out on purpose is summed up, and stays under its share of the order.
+TEST(Effects, WhatIsLeftOutIsToldAsBias) {
+  SceneData data = plain_scene();
+  data.lights.push_back(lamp(LightKind::point, 1e-5f));
+  const LitScene lit(data, constant_environment({1, 1, 1}), {std::nullopt, 0.1, 1.0});
+  const double lamp_bound = effect(lit, "punctual_point").bound;
+  EXPECT_GT(lamp_bound, 0);
+  EXPECT_GT(lit.effects.truncation_bound, 0);
+  EXPECT_EQ(lit.effects.bias_bound, lamp_bound + lit.effects.truncation_bound);
+  EXPECT_LE(lit.effects.bias_bound, kBiasShare * 0.1);
+  // Bounces that were ordered leave nothing out that was asked for.
+  const LitScene ordered(data, constant_environment({1, 1, 1}), {2, 0.1, 1.0});
+  EXPECT_GT(ordered.effects.truncation_bound, 0);
+  EXPECT_EQ(ordered.effects.bias_bound, effect(ordered, "punctual_point").bound);
+  // Nothing negligible, nothing truncated: no bias.
+  const LitScene all(plain_scene(), constant_environment({1, 1, 1}), {3, 0.1, 1.0});
+  EXPECT_EQ(all.effects.bias_bound, 0);
 }
 
 TEST(Effects, WhiteRoomsEndAtSixtyFourBouncesAndSaySo) {

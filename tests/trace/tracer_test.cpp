@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include <embree3/rtcore.h>
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
@@ -203,6 +204,114 @@ TEST(Tracer, SliversNeverReportHitsOutsideTheScene) {  // G7
     ASSERT_TRUE(is_finite(surface_point(scene, hit).normal));
   }
   EXPECT_EQ(missed, 0u);
+}
+
+// G7, positive control: rays across the planes of slivers, which Embree itself reports as hit far
+// outside the scene even in robust mode; through the tracer none is.
+TEST(Tracer, TheReachEndsHitsThatEmbreeReportsOutsideTheScene) {
+  constexpr uint64_t kSlivers = 20'000;
+  MeshData mesh = test::reversed(test::make_box({-1, -1, -1}, {1, 1, 1}));
+  const auto centre = [](uint64_t i) { return random_direction(i) * 0.7f; };
+  const auto along = [](uint64_t i) { return random_direction(~i); };
+  const auto across = [](uint64_t i) { return random_direction(i + 1'000'000); };
+  const size_t walls = mesh.triangles.size();
+  for (uint64_t i = 0; i < kSlivers; ++i) {
+    const auto index = static_cast<uint32_t>(mesh.positions.size());
+    for (const Vec3& p : {centre(i) - along(i) * 0.1f, centre(i) + along(i) * 0.1f,
+                          centre(i) + across(i) * 1e-5f}) {
+      mesh.positions.push_back(p);
+      mesh.normals.push_back({0, 1, 0});
+      mesh.texcoords.push_back({});
+    }
+    mesh.triangles.push_back({index, index + 1, index + 2});
+  }
+  // Without the walls, which would end a ray before an absurd hit.
+  MeshData slivers = mesh;
+  slivers.triangles.erase(slivers.triangles.begin(),
+                          slivers.triangles.begin() + static_cast<ptrdiff_t>(walls));
+  const Scene scene = raw_scene(slivers);
+  const Tracer tracer(scene, {});
+  const RTCDevice device = rtcNewDevice("threads=1,isa=avx");
+  const RTCScene bare = rtcNewScene(device);
+  rtcSetSceneFlags(bare, RTC_SCENE_FLAG_ROBUST);
+  const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  std::memcpy(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                      sizeof(Vec3), slivers.positions.size()),
+              slivers.positions.data(), slivers.positions.size() * sizeof(Vec3));
+  std::memcpy(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12,
+                                      slivers.triangles.size()),
+              slivers.triangles.data(), slivers.triangles.size() * 12);
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(bare, geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(bare);
+
+  RayCounters counters;
+  uint64_t absurd = 0, capped = 0;
+  // No surface lies farther than the sphere around the scene reaches.
+  const float radius = std::sqrt(3.0f);
+  for (uint64_t i = 0; i < 100'000; ++i) {
+    const uint64_t s = hash64(i) % kSlivers;
+    const auto slope = static_cast<float>(hash64(i * 77) % 1000) / 500.0f - 1;
+    const Vec3 d = along(s) + across(s) * slope + random_direction(i) * (i % 4 > 1 ? 1e-7f : 1e-6f);
+    const float back = 0.05f + 0.3f * static_cast<float>(i % 7);
+    const Vec3 aside = random_direction(3 * i) * (i % 2 ? 1e-7f : 0.0f);
+    const Vec3 o = centre(s) + across(s) * 3e-6f - d * back + aside;
+    RTCRayHit ray{};
+    ray.ray = {o.x, o.y, o.z, 0, d.x, d.y, d.z, 0, INFINITY, 0xffffffffu, 0, 0};
+    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcIntersect1(bare, &context, &ray);
+    const float reach = (length(o) + radius) * 1.001f;
+    absurd += ray.hit.geomID != RTC_INVALID_GEOMETRY_ID && ray.ray.tfar * length(d) > reach;
+    const Hit hit = tracer.nearest({o, d}, counters);
+    capped += hit.hit() && hit.t * length(d) > reach;
+  }
+  rtcReleaseScene(bare);
+  rtcReleaseDevice(device);
+  EXPECT_GT(absurd, 0u);
+  EXPECT_EQ(capped, 0u);
+}
+
+// The share of cosine-weighted rays from one face of a unit cube that meet another is their form
+// factor: 0.199825 for the opposite face, 0.200044 for each of the four beside it (Howell, "A
+// Catalog of Radiation Heat Transfer Configuration Factors", C-11 and C-14).
+TEST(Tracer, FormFactorsOfTheUnitCube) {
+  const MeshData box = test::reversed(test::make_box({0, 0, 0}, {1, 1, 1}));
+  const Scene scene = raw_scene(box);
+  const Tracer tracer(scene, {});
+  RayCounters counters;
+  constexpr uint32_t kRays = 1 << 18;
+  const auto axis_of = [&](uint32_t triangle) {
+    Hit hit;
+    hit.triangle = triangle;
+    const Vec3 normal = surface_point(scene, hit).normal;
+    return std::abs(normal.x) > 0.5f ? 0 : std::abs(normal.y) > 0.5f ? 1 : 2;
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    uint64_t opposite = 0, beside[3] = {};
+    for (uint32_t i = 0; i < kRays; ++i) {
+      const Point4 u = sobol4(static_cast<uint64_t>(axis) + 5, i);
+      const float r = std::sqrt(u.z), phi = 2 * static_cast<float>(kPi) * u.w;
+      const float local[3] = {std::sqrt(1 - u.z), r * std::cos(phi), r * std::sin(phi)};
+      const float place[3] = {0, u.x, u.y};
+      Vec3 origin, direction;
+      for (int k = 0; k < 3; ++k) {
+        origin[(axis + k) % 3] = place[k];
+        direction[(axis + k) % 3] = local[k];
+      }
+      const Hit hit = tracer.nearest({origin, direction, 1e-6f}, counters);
+      ASSERT_TRUE(hit.hit());
+      const int met = axis_of(hit.triangle);
+      met == axis ? ++opposite : ++beside[met];
+    }
+    // 4.5 standard errors of independent rays are 3.5e-3; scrambled points do far better.
+    EXPECT_NEAR(static_cast<double>(opposite) / kRays, 0.199825, 5e-4);
+    for (int k = 1; k < 3; ++k) {
+      EXPECT_NEAR(static_cast<double>(beside[(axis + k) % 3]) / kRays, 2 * 0.200044, 1e-3);
+    }
+  }
 }
 
 // Why the loader brings every scene to a size of about one: far from it float under- and overflows

@@ -30,7 +30,9 @@ void print_plan(const Plan& plan) {
             << printable(format_units(plan.elements, plan.element_unit)) << " in "
             << format_units(plan.chunks.size(), "chunk") << ", at most "
             << format_count(plan.max_samples) << " samples each, "
-            << format_seconds(plan.predicted_s) << " predicted\n\n";
+            << format_seconds(plan.predicted_s) << " predicted ("
+            << format_seconds(plan.predicted_low_s) << " to "
+            << format_seconds(plan.predicted_high_s) << ")\n\n";
   print_effects(plan);
   std::cout << '\n';
   print_prices(plan);
