@@ -123,6 +123,32 @@ void write_map(JsonWriter& writer, const MapDocument& map, const auto& own) {
   writer.end_object();
 }
 
+void write_asset(JsonWriter& writer, const AssetDocument& document) {
+  writer.begin_object()
+      .member("artifact", document.artifact)
+      .member("extension", "EXT_lights_image_based")
+      .member("packing", "RGBD: (rgb / 255)^2.2 / (a / 255); at most 255")
+      .key("levels")
+      .begin_array();
+  for (const AssetLevelDocument& level : document.levels) {
+    writer.begin_object()
+        .member("size", level.size)
+        .member("roughness", level.roughness)
+        .member("alpha", level.roughness * level.roughness)
+        .member("error_bound", level.error_bound);
+    write_measured(writer, level.measured);
+    writer.key("packing_error")
+        .begin_object()
+        .member("rms", level.packing_rms)
+        .member("max", level.packing_max)
+        .member("cut_texels", level.cut_texels)
+        .member("cut_share", level.cut_share)
+        .end_object()
+        .end_object();
+  }
+  writer.end_array().end_object();
+}
+
 void write_environment(JsonWriter& writer, const EnvironmentDocument& document) {
   write_radiance_convention(writer);
   writer.key("source")
@@ -159,6 +185,11 @@ void write_environment(JsonWriter& writer, const EnvironmentDocument& document) 
   writer.end_array().key("dfg");
   if (document.dfg)
     write_map(writer, *document.dfg, [] {});
+  else
+    writer.null();
+  writer.key("asset");
+  if (document.asset)
+    write_asset(writer, *document.asset);
   else
     writer.null();
 }

@@ -197,6 +197,26 @@ KindTable environment_maps_table() {
          false, "Rows of the spectrum. Cost grows as with as many bands of coefficients."}},
        [](const Spec& s) { return parameters<Maps>(s).spectrum.has_value(); },
        [](Spec& s) { parameters<Maps>(s).spectrum.emplace(); }});
+  groups.push_back(
+      {"/parameters/asset",
+       {{"size",
+         +[](Spec& s) -> int& { return parameters<Maps>(s).asset->size; },
+         {32, 1024},
+         false,
+         "Texels along a face's side of level 0, a power of two; levels halve it down to 16."},
+        {"roughness",
+         NameMember{
+             {"linear", "babylon"},
+             [](const Spec& s) {
+               return static_cast<size_t>(parameters<Maps>(s).asset->roughness);
+             },
+             [](Spec& s, size_t i) { parameters<Maps>(s).asset->roughness = AssetRoughness(i); }},
+         {},
+         false,
+         "Roughness of the levels. linear: from 0 to 1 in equal steps, as the extension's text "
+         "says. babylon: what Babylon.js looks up, size^((level / (levels - 1) - 1) / 2)."}},
+       [](const Spec& s) { return parameters<Maps>(s).asset.has_value(); },
+       [](Spec& s) { parameters<Maps>(s).asset.emplace(); }});
   return {
       Kind::environment_maps,
       "Coefficients, irradiance, a GGX-prefiltered chain and the DFG table of a lat-long image.",

@@ -102,6 +102,21 @@ struct SpectrumDocument {
   double error_bound = 0;          // of a coefficient, relative to L00
   MeasuredError measured;
 };
+// A glTF asset that lights a scene by the map, and what its 8-bit images changed.
+struct AssetLevelDocument {
+  int size = 0;
+  double roughness = 0;
+  double error_bound = 0;  // before packing; as of MapDocument
+  MeasuredError measured;  // before packing
+  // Of packing, relative to the map's mean luminance; what the format cannot hold is cut.
+  double packing_rms = 0, packing_max = 0;
+  uint64_t cut_texels = 0;
+  double cut_share = 0;  // of the level's light
+};
+struct AssetDocument {
+  std::string artifact;
+  std::vector<AssetLevelDocument> levels;
+};
 struct EnvironmentDocument {
   int source_width = 0, source_height = 0;
   std::string source_format;
@@ -117,6 +132,7 @@ struct EnvironmentDocument {
   std::optional<MapDocument> irradiance;
   std::vector<MapDocument> prefilter;  // levels from the sharpest
   std::optional<MapDocument> dfg;
+  std::optional<AssetDocument> asset;
 };
 
 enum class ProbeStatus { valid, inside_geometry, on_surface };

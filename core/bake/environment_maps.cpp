@@ -181,6 +181,10 @@ Plan environment_maps_plan(EnvironmentMapsState& state, Progress& progress) {
   if (!(luminance(environment.mean) > 0)) {
     plan.warnings.push_back("The environment is black: every light output is 0.");
   }
+  for (const auto& output : state.outputs) {
+    std::string warning = output->warning(state.light);
+    if (!warning.empty()) plan.warnings.push_back(std::move(warning));
+  }
   plan.elements = state.outputs.size();
   plan.element_unit = "output";
   plan.reference_luminance = 1;

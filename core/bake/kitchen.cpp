@@ -108,6 +108,11 @@ void ByteWriter::floats(std::span<const float> values) {
   append(bytes_, values.data(), values.size());
 }
 
+void ByteWriter::sized(std::span<const std::byte> bytes) {
+  u64(bytes.size());
+  append(bytes_, bytes.data(), bytes.size());
+}
+
 uint64_t ByteReader::u64() {
   return extract_one<uint64_t>(bytes_);
 }
@@ -122,6 +127,13 @@ float ByteReader::f32() {
 }
 void ByteReader::floats(std::span<float> values) {
   extract(bytes_, values.data(), values.size());
+}
+std::vector<std::byte> ByteReader::sized() {
+  const uint64_t size = u64();
+  if (size > bytes_.size()) throw Error(ErrorCode::internal, "Chunk bytes end early.");
+  std::vector<std::byte> taken(static_cast<size_t>(size));
+  extract(bytes_, taken.data(), taken.size());
+  return taken;
 }
 
 }  // namespace lightkiln

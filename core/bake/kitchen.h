@@ -27,6 +27,7 @@ class ByteWriter {
   void f64(double value);
   void f32(float value);
   void floats(std::span<const float> values);
+  void sized(std::span<const std::byte> bytes);  // their number before them
   std::vector<std::byte> take() { return std::move(bytes_); }
 
  private:
@@ -41,6 +42,7 @@ class ByteReader {
   double f64();
   float f32();
   void floats(std::span<float> values);
+  std::vector<std::byte> sized();
   bool at_end() const { return bytes_.empty(); }
 
  private:

@@ -16,6 +16,7 @@ inline constexpr double kPerBrightTexel = 7e-9;
 inline constexpr double kPerCorePoint = 4e-9;
 inline constexpr double kResamplePerCell = 1.3e-8;
 inline constexpr double kPerDfgValue = 2.8e-6;
+inline constexpr double kRgbdPerTexel = 4e-7;   // packing and writing PNG
 inline constexpr double kBrutePerTexel = 5e-9;  // of the map, each texel that is checked
 
 inline constexpr double kEnergyPerTexel = 2e-9;

@@ -76,7 +76,6 @@ Vec3d slow_average(const Environment& environment, const Lobe& lobe, const Vec3d
 
 }  // namespace
 
-// Relative to the output's mean.
 MeasuredError ConvolvedCube::check(MapsLight& light, const Image& cube, int count,
                                    Progress& progress) const {
   ErrorMeter meter(scale_ * luminance(light.environment().mean));

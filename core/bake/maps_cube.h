@@ -25,10 +25,12 @@ class ConvolvedCube : public MapsOutput {
   int size() const { return size_; }
   Image read(ByteReader& reader) const;
 
- private:
+  bool constant() const { return constant_; }
   Image make_cube(MapsLight& light, Progress& progress) const;
+  // Relative to the output's mean.
   MeasuredError check(MapsLight& light, const Image& cube, int count, Progress& progress) const;
 
+ private:
   int size_;
   std::optional<Lobe> lobe_;
   double scale_;

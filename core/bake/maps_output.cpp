@@ -8,8 +8,8 @@
 namespace lightkiln {
 
 std::span<const MapsProduct> maps_products() {
-  static const MapsProduct products[] = {kShProduct, kIrradianceProduct, kPrefilterProduct,
-                                         kDfgProduct, kSpectrumProduct};
+  static const MapsProduct products[] = {kShProduct,  kIrradianceProduct, kPrefilterProduct,
+                                         kDfgProduct, kSpectrumProduct,   kAssetProduct};
   return products;
 }
 

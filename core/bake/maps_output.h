@@ -28,6 +28,8 @@ class MapsOutput {
   virtual SpectrumNeed spectrum_need() const { return {}; }
   // CPU seconds on the model's core (maps_cost.h) beside those of the shared coefficients.
   virtual double model_seconds(MapsLight& light) const = 0;
+  // Of what the ordered form cannot hold, for the plan; "" = nothing.
+  virtual std::string warning(MapsLight&) const { return {}; }
   // Writes the output's values: a pure function of spec and inputs. `check_texels` of them (texels,
   // coefficients or entries) are held against a slow double-precision twin; the result says by how
   // much they differ. 0 = none.
@@ -98,5 +100,6 @@ extern const MapsProduct kIrradianceProduct;
 extern const MapsProduct kPrefilterProduct;
 extern const MapsProduct kDfgProduct;
 extern const MapsProduct kSpectrumProduct;
+extern const MapsProduct kAssetProduct;
 
 }  // namespace lightkiln

@@ -147,14 +147,21 @@ void check_sh(const ShOutput& sh, Checker& checker) {
 }
 
 void check_environment_maps(const EnvironmentMapsParameters& p, Checker& checker) {
-  if (!p.sh && !p.irradiance && !p.prefilter && !p.dfg && !p.spectrum)
+  if (!p.sh && !p.irradiance && !p.prefilter && !p.dfg && !p.spectrum && !p.asset)
     checker.fault("/parameters", "missing",
-                  "Order at least one of sh, irradiance, prefilter, dfg and spectrum.");
+                  "Order at least one of sh, irradiance, prefilter, dfg, spectrum and asset.");
   if (p.sh) check_sh(*p.sh, checker);
   if (p.spectrum) checker.between(p.spectrum->bands, 1, 129, "/parameters/spectrum/bands", "bands");
   if (p.irradiance)
     checker.between(p.irradiance->size, 1, 1024, "/parameters/irradiance/size", "size");
   if (p.dfg) checker.between(p.dfg->size, 8, 1024, "/parameters/dfg/size", "size");
+  if (p.asset) {
+    const int side = p.asset->size;
+    if (side < 32 || side > 1024 || !std::has_single_bit(static_cast<unsigned int>(side)))
+      checker.fault(
+          "/parameters/asset/size", "range",
+          "size is " + std::to_string(side) + "; allowed are the powers of two from 32 to 1024.");
+  }
   if (!p.prefilter) return;
   const auto [size, levels] = *p.prefilter;
   if (size < 8 || size > 2048 || !std::has_single_bit(static_cast<unsigned int>(size)))

@@ -66,12 +66,25 @@ struct DfgOutput {
   int size = 128;  // texels a side, 8..1024
 };
 
+// Which roughness a level of the asset holds.
+enum class AssetRoughness {
+  linear,   // level / (levels - 1): what the extension's text says
+  babylon,  // size^((level / (levels - 1) - 1) / 2): what Babylon.js 9 looks up
+};
+struct AssetOutput {
+  // Texels a face side of level 0, power of two, 32..1024; levels halve it down to 16. Cost and
+  // file grow with size^2.
+  int size = 256;
+  AssetRoughness roughness = AssetRoughness::linear;
+};
+
 struct EnvironmentMapsParameters {
   std::optional<ShOutput> sh;
   std::optional<IrradianceOutput> irradiance;
   std::optional<PrefilterOutput> prefilter;
   std::optional<DfgOutput> dfg;
   std::optional<SpectrumOutput> spectrum;
+  std::optional<AssetOutput> asset;
   // At least one of them is ordered.
 };
 

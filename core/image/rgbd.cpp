@@ -62,15 +62,14 @@ Image8 encode_rgbd(const Image& image, RgbdLoss* loss) {
   packed.channels = 4;
   packed.pixels.reserve(image.pixels.size() / 3 * 4);
   RgbdLoss found;
-  double sum = 0, cut_off = 0, squares = 0;
+  double squares = 0;
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
       Vec3d value = to_double(image.rgb(x, y));
-      sum += value.x + value.y + value.z;
       const double largest = std::max({value.x, value.y, value.z});
       if (largest > kMaxRgbd) {
         const Vec3d kept = value * (kMaxRgbd / largest);
-        cut_off += (value.x - kept.x) + (value.y - kept.y) + (value.z - kept.z);
+        found.cut_off += (value.x - kept.x) + (value.y - kept.y) + (value.z - kept.z);
         value = kept;
         ++found.cut;
       }
@@ -83,7 +82,6 @@ Image8 encode_rgbd(const Image& image, RgbdLoss* loss) {
     }
   }
   found.rms = std::sqrt(squares / static_cast<double>(std::max<size_t>(image.pixels.size(), 1)));
-  found.cut_share = sum > 0 ? cut_off / sum : 0;
   if (loss) *loss = found;
   return packed;
 }

@@ -14,10 +14,10 @@ inline constexpr double kMaxRgbd = 255;
 
 // What packing changed.
 struct RgbdLoss {
-  double rms = 0;        // over texels and channels of what was not cut, in units of the image
-  double largest = 0;    // of any channel that was not cut, in units of the image
-  uint64_t cut = 0;      // texels with a channel above kMaxRgbd; their hue is kept
-  double cut_share = 0;  // of the sum of all texels' channels: what cutting took away
+  double rms = 0;      // over texels and channels of what was not cut, in units of the image
+  double largest = 0;  // of any channel that was not cut, in units of the image
+  uint64_t cut = 0;    // texels with a channel above kMaxRgbd; their hue is kept
+  double cut_off = 0;  // the sum over texels and channels of what cutting took away
 };
 
 // Three channels in, four out: value = (rgb / 255)^2.2 / (a / 255), with the largest a, so that the

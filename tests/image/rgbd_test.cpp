@@ -59,14 +59,14 @@ TEST(Rgbd, ReportsWhatItCutAndKeepsTheHue) {
   RgbdLoss loss;
   const Image8 packed = encode_rgbd(image, &loss);
   EXPECT_EQ(loss.cut, 1u);
-  EXPECT_NEAR(loss.cut_share, (255 + 127.5) / 768, 1e-12);
+  EXPECT_NEAR(loss.cut_off, 255 + 127.5, 1e-12);
   const Vec3d value = decode_rgbd(packed.pixels.data());
   EXPECT_EQ(value.x, 255);
   EXPECT_NEAR(value.y, 127.5, 0.006 * 127.5);
   RgbdLoss none;
   encode_rgbd(one(255, 200, 0.5), &none);
   EXPECT_EQ(none.cut, 0u);
-  EXPECT_EQ(none.cut_share, 0);
+  EXPECT_EQ(none.cut_off, 0);
 }
 
 TEST(Rgbd, MeasuresItsOwnError) {
