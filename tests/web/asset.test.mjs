@@ -116,10 +116,18 @@ test("a mirror shows every direction where glTF puts it", async () => {
   const seen = await viewer.look(places, { metallic: 1, roughness: 0 });
   const error = worst(seen, directions.map(radiance));
   assert.ok(error < 0.03, `the mirror is wrong by ${error}: ${JSON.stringify(seen)}`);
+  if (process.env.SCREENSHOTS) await viewer.picture(`${process.env.SCREENSHOTS}/asset.png`, "place 4", { metallic: 1, roughness: 0 });
   // What a mirrored or turned world would show is far from it.
   for (const wrong of [([x, y, z]) => [-x, y, z], ([x, y, z]) => [x, y, -z], ([x, y, z]) => [-x, y, -z], ([x, y, z]) => [x, -y, z]]) {
     assert.ok(worst(seen, directions.map(wrong).map(radiance)) > 0.8);
   }
+});
+
+// Why the page corrects what the loader says of its texture: the control of the test above.
+test("as the loader leaves its texture, colours come out to the power 2.2", async () => {
+  await viewer.load(withPlaces(assets.linear, directions), { gammaSpace: true });
+  const seen = await viewer.look(places, { metallic: 1, roughness: 0 });
+  assert.ok(worst(seen, directions.map((d) => radiance(d).map((x) => x ** 2.2))) < 0.03, JSON.stringify(seen));
 });
 
 test("a white wall is lit by the irradiance of its side", async () => {

@@ -37,6 +37,7 @@ const kSide = 9;  // pixels of the target that numbers are read from
 
 window.load = async (base64, { rightHanded, gammaSpace }) => {
   window.scene?.dispose();
+  window.sky = undefined;
   const scene = (window.scene = new Scene(engine));
   scene.useRightHandedSystem = rightHanded;
   await AppendSceneAsync("data:model/gltf-binary;base64," + base64, scene, { pluginExtension: ".glb" });
@@ -99,10 +100,12 @@ window.picture = async (name, { metallic, roughness }) => {
   camera.upVector = new Vector3(0, 1, 0);
   camera.setTarget(Vector3.Zero());
   scene.imageProcessingConfiguration.applyByPostProcess = false;
-  window.sky ??= new Map();
-  if (!window.sky.has(scene)) window.sky.set(scene, scene.createDefaultSkybox(scene.environmentTexture, true, 100, 0, false));
+  window.sky ??= scene.createDefaultSkybox(scene.environmentTexture, true, 100, 0, false);
   await scene.whenReadyAsync();
-  for (let frame = 0; frame < 3; frame += 1) scene.render();
+  for (let frame = 0; frame < 10; frame += 1) {
+    scene.render();
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
   camera.fov = 0.002;
   scene.imageProcessingConfiguration.applyByPostProcess = true;
 };
@@ -139,7 +142,6 @@ export async function startViewer() {
   });
   return {
     complaints,
-    evaluate: (f) => tab.evaluate(f),
     load: (glb, options = {}) =>
       tab.evaluate(([bytes, given]) => window.load(bytes, given), [Buffer.from(glb).toString("base64"), { rightHanded: false, gammaSpace: false, ...options }]),
     look: (names, material) => tab.evaluate(([n, m]) => window.look(n, m), [names, material]),
