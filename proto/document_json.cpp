@@ -4,6 +4,7 @@
 #include "proto/harmonics_json.h"
 #include "proto/json.h"
 #include "proto/json_writer.h"
+#include "proto/layouts_json.h"
 
 namespace lightkiln {
 namespace {
@@ -155,8 +156,9 @@ void write_environment(JsonWriter& writer, const EnvironmentDocument& document) 
       .begin_object()
       .member("width", document.source_width)
       .member("height", document.source_height)
-      .member("format", document.source_format)
-      .member("mean", document.mean)
+      .member("format", document.source_format);
+  write_source_layout(writer, document);
+  writer.member("mean", document.mean)
       .member("max_luminance", document.max_luminance)
       .key("repairs")
       .begin_object()
@@ -192,6 +194,8 @@ void write_environment(JsonWriter& writer, const EnvironmentDocument& document) 
     write_asset(writer, *document.asset);
   else
     writer.null();
+  writer.key("layouts");
+  write_layouts(writer, document.layouts);
 }
 
 void write_probes(JsonWriter& writer, const ProbesDocument& document) {

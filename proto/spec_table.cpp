@@ -1,6 +1,9 @@
 #include "proto/spec_table.h"
 
 #include <algorithm>
+#include <utility>
+
+#include "proto/spec_layouts.h"
 
 namespace lightkiln {
 namespace {
@@ -159,6 +162,8 @@ KindTable environment_maps_table() {
   std::vector<ParameterGroup> groups = {without(root_group(), {"seed"}),
                                         without(accuracy_group(), {"max_samples", "max_seconds"}),
                                         {"/parameters", {}}};
+  groups.push_back(maps_source_group());
+  groups.push_back(maps_rotation_group());
   groups.push_back(maps_sh_group());
   groups.push_back({"/parameters/irradiance",
                     {{"size",
@@ -217,11 +222,12 @@ KindTable environment_maps_table() {
          "says. babylon: what Babylon.js looks up, size^((level / (levels - 1) - 1) / 2)."}},
        [](const Spec& s) { return parameters<Maps>(s).asset.has_value(); },
        [](Spec& s) { parameters<Maps>(s).asset.emplace(); }});
-  return {
-      Kind::environment_maps,
-      "Coefficients, irradiance, a GGX-prefiltered chain and the DFG table of a lat-long image.",
-      {{"environment", &Spec::environment, true}},
-      groups};
+  for (ParameterGroup& group : layout_groups()) groups.push_back(std::move(group));
+  return {Kind::environment_maps,
+          "Coefficients, irradiance, a GGX-prefiltered chain and the DFG table of an environment "
+          "map, and the map in any layout.",
+          {{"environment", &Spec::environment, true}},
+          groups};
 }
 
 KindTable probes_table() {
@@ -240,6 +246,8 @@ KindTable probes_table() {
          "Diffuse bounces. 0 = only light that surfaces emit or the environment sends straight to "
          "the probe. null = the fewest whose truncation bound stays under half the ordered "
          "error."}}});
+  groups.push_back(probes_source_group());
+  groups.push_back(probes_rotation_group());
   groups.push_back({"/parameters/cubemap",
                     {{"size",
                       +[](Spec& s) -> int& { return parameters<Probes>(s).cubemap.size; },

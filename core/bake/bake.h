@@ -22,6 +22,7 @@
 
 #include "core/bake/plan.h"
 #include "core/base/progress.h"
+#include "core/environment/round_trip.h"
 #include "core/image/image.h"
 #include "core/sphere/harmonic_spectrum.h"
 #include "core/sphere/harmonics.h"
@@ -117,7 +118,18 @@ struct AssetDocument {
   std::string artifact;
   std::vector<AssetLevelDocument> levels;
 };
+// The map in another layout.
+struct LayoutDocument {
+  std::string name;                     // as ordered: "octahedral"
+  std::vector<std::string> artifacts;   // one; of cube_faces six, +X -X +Y -Y +Z -Z
+  MapLayout layout;                     // of cube_faces: the strip of its faces
+  double error_bound = 0;               // rms of a texel's mean; 0 where texels are only moved
+  std::optional<RoundTrip> round_trip;  // none when nothing was to be checked
+};
 struct EnvironmentDocument {
+  MapLayout source_layout;          // of the file
+  double source_covered_share = 1;  // of the sphere; the rest was taken as black
+  Rotation rotation;
   int source_width = 0, source_height = 0;
   std::string source_format;
   PixelRepairs repairs;
@@ -129,6 +141,7 @@ struct EnvironmentDocument {
   std::optional<Zh3> zh3;
   std::vector<ShExport> sh_exports;
   std::optional<SpectrumDocument> spectrum;
+  std::vector<LayoutDocument> layouts;
   std::optional<MapDocument> irradiance;
   std::vector<MapDocument> prefilter;  // levels from the sharpest
   std::optional<MapDocument> dfg;

@@ -18,7 +18,6 @@ struct EnvironmentMapsState {
   Spec spec;
   Grants grants;
   std::string format;
-  EnvmapAttribute envmap = EnvmapAttribute::none;
   std::vector<std::string> warnings;  // of the input
   MapsLight light;
   MapsOutputs outputs;
@@ -45,14 +44,16 @@ int bands_of(const MapsOutputs& outputs) {
 
 std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_maps_open(
     const Spec& spec, const Inputs& inputs, const Grants& grants) {
+  const auto& parameters = std::get<EnvironmentMapsParameters>(spec.parameters);
   DecodedImage decoded = decode_light_image(blob_bytes(spec.environment.value(), inputs));
   std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> state(
       new EnvironmentMapsState{spec,
                                grants,
                                decoded.format,
-                               decoded.envmap,
                                light_warnings(decoded),
-                               {make_environment(std::move(decoded)), grants.threads},
+                               {make_environment(std::move(decoded), reading_of(parameters.source),
+                                                 rotation_of(parameters.rotation), grants.threads),
+                                grants.threads},
                                {}});
   state->outputs =
       order_outputs(state->parameters(), state->light, working_target(state->target()));
@@ -99,15 +100,45 @@ Effect bright_effect(EnvironmentMapsState& state) {
 }
 
 Effect convention_effect(const EnvironmentMapsState& state) {
-  if (state.envmap == EnvmapAttribute::latlong) {
-    const int width = state.light.environment().radiance.width;
+  const Environment& environment = state.light.environment();
+  if (environment.source_layout.convention == TexelConvention::openexr) {
     return {"border_texels", true,
-            "The file says envmap = latlong, whose outer pixel centres lie on the borders: it was "
-            "resampled to centres at (i + 1/2)/N.",
-            std::min(1.0, 0.5 / width)};
+            "The file's outer pixel centres lie on the borders (OpenEXR's envmap convention): it "
+            "is resampled, twice as fine, to centres at (i + 1/2)/N.",
+            std::min(1.0, 0.5 / environment.source_layout.width)};
   }
-  return {"border_texels", false,
-          "The file carries no envmap attribute: texel centres lie at (i + 1/2)/N.", 0};
+  return {"border_texels", false, "Texel centres of the file lie at (i + 1/2)/N.", 0};
+}
+
+Effect layout_effect(const EnvironmentMapsState& state) {
+  const Environment& environment = state.light.environment();
+  if (environment.source_layout.kind == LayoutKind::latlong) {
+    return {"source_layout", false, "The file is a lat-long map, which is what is baked from.", 0};
+  }
+  const Image& map = environment.radiance;
+  return {"source_layout", true,
+          std::string("The file is read as ") + layout_name(environment.source_layout.kind) +
+              " and brought to a lat-long map of " + std::to_string(map.width) + " x " +
+              std::to_string(map.height) + " texels, as fine as its own.",
+          1};
+}
+
+Effect coverage_effect(const EnvironmentMapsState& state) {
+  const double missing = 1 - state.light.environment().covered_share;
+  if (missing <= 1e-12) return {"source_coverage", false, "The file shows the whole sphere.", 0};
+  return {"source_coverage", true,
+          "The file does not show " + short_number(100 * missing) +
+              " % of the sphere, which is taken as black.",
+          missing};
+}
+
+Effect rotation_effect(const EnvironmentMapsState& state) {
+  const Environment& environment = state.light.environment();
+  if (environment.rotation.is_identity()) return {"rotation", false, "Not ordered.", 0};
+  return {"rotation", true,
+          "The environment is turned before anything is made of it; layouts are turned from the "
+          "file's own pixels.",
+          1};
 }
 
 Effect harmonics_effect(const EnvironmentMapsState& state) {
@@ -122,8 +153,10 @@ Effect harmonics_effect(const EnvironmentMapsState& state) {
 }
 
 std::vector<Effect> list_effects(EnvironmentMapsState& state) {
-  std::vector<Effect> effects = {variation_effect(state), bright_effect(state),
-                                 convention_effect(state), harmonics_effect(state)};
+  std::vector<Effect> effects = {variation_effect(state),  bright_effect(state),
+                                 convention_effect(state), layout_effect(state),
+                                 coverage_effect(state),   rotation_effect(state),
+                                 harmonics_effect(state)};
   for (const MapsProduct& product : maps_products()) {
     if (product.ordered(state.parameters()))
       effects.push_back({product.name, true, product.reason, 1});
@@ -178,6 +211,10 @@ Plan environment_maps_plan(EnvironmentMapsState& state, Progress& progress) {
   if (repairs.infinite > 0) plan.repairs.emplace_back("infinite_pixels", repairs.infinite);
   if (repairs.negative > 0) plan.repairs.emplace_back("negative_pixels", repairs.negative);
   plan.warnings = state.warnings;
+  if (environment.covered_share < 1 - 1e-12) {
+    plan.warnings.push_back("The file shows " + short_number(100 * environment.covered_share) +
+                            " % of the sphere; the rest is black.");
+  }
   if (!(luminance(environment.mean) > 0)) {
     plan.warnings.push_back("The environment is black: every light output is 0.");
   }
@@ -304,8 +341,11 @@ Assembly environment_maps_assemble(EnvironmentMapsState& state, const Plan& plan
   Assembly assembly;
   EnvironmentDocument document;
   const Environment& environment = state.light.environment();
-  document.source_width = environment.radiance.width;
-  document.source_height = environment.radiance.height;
+  document.source_width = environment.source_layout.width;
+  document.source_height = environment.source_layout.height;
+  document.source_layout = environment.source_layout;
+  document.source_covered_share = environment.covered_share;
+  document.rotation = environment.rotation;
   document.source_format = state.format;
   document.repairs = environment.repairs;
   document.mean = environment.mean;

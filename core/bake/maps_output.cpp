@@ -8,8 +8,9 @@
 namespace lightkiln {
 
 std::span<const MapsProduct> maps_products() {
-  static const MapsProduct products[] = {kShProduct,  kIrradianceProduct, kPrefilterProduct,
-                                         kDfgProduct, kSpectrumProduct,   kAssetProduct};
+  static const MapsProduct products[] = {kShProduct,     kIrradianceProduct, kPrefilterProduct,
+                                         kDfgProduct,    kSpectrumProduct,   kAssetProduct,
+                                         kLayoutsProduct};
   return products;
 }
 

@@ -101,5 +101,6 @@ extern const MapsProduct kPrefilterProduct;
 extern const MapsProduct kDfgProduct;
 extern const MapsProduct kSpectrumProduct;
 extern const MapsProduct kAssetProduct;
+extern const MapsProduct kLayoutsProduct;
 
 }  // namespace lightkiln

@@ -21,7 +21,10 @@ std::unique_ptr<ProbesState, ProbesStateDeleter> probes_open(const Spec& spec, c
   state->grants = grants;
   state->scene = load_gltf(gltf_source(*spec.scene, inputs), {});
   if (spec.environment) {
-    state->environment = make_environment(decode_hdr_image(blob_bytes(*spec.environment, inputs)));
+    state->environment = make_environment(
+        decode_light_image(blob_bytes(*spec.environment, inputs)),
+        reading_of(std::get<ProbesParameters>(spec.parameters).source),
+        rotation_of(std::get<ProbesParameters>(spec.parameters).rotation), grants.threads);
   }
   state->survey = survey_light(state->scene, state->light());
   TracerOptions options;

@@ -146,10 +146,80 @@ void check_sh(const ShOutput& sh, Checker& checker) {
     checker.fault("/parameters/sh/exports", "range", "exports names an engine that is not known.");
 }
 
+bool any_layout(const LayoutOrders& orders) {
+  return std::any_of(orders.begin(), orders.end(),
+                     [](const auto& order) { return order.has_value(); });
+}
+
+void check_distance(const std::optional<double>& distance, const std::string& pointer,
+                    Checker& checker) {
+  if (distance && !(*distance > 1 && *distance <= 1e6))
+    checker.fault(pointer + "/distance", "range",
+                  "distance must be above 1, the ball's own radius, and at most 1e6.");
+}
+
+void check_source(const SourceParameters& p, Checker& checker) {
+  const std::string pointer = "/parameters/source";
+  const bool ball = p.layout == LayoutKind::mirror_ball;
+  if (p.distance && !ball)
+    checker.fault(pointer + "/distance", "conflict", "distance belongs to the layout mirror_ball.");
+  if (p.mirrored && !ball && p.layout != LayoutKind::angular)
+    checker.fault(pointer + "/mirrored", "conflict",
+                  "mirrored belongs to the layouts angular and mirror_ball.");
+  check_distance(p.distance, pointer, checker);
+  const bool borders =
+      !p.layout || p.layout == LayoutKind::latlong || p.layout == LayoutKind::cube_strip;
+  if (p.texel_convention == TexelConvention::openexr && !borders)
+    checker.fault(pointer + "/texel_convention", "conflict",
+                  "openexr belongs to the layouts latlong and cube_strip.");
+}
+
+void check_rotation(const RotationParameters& p, Checker& checker) {
+  const std::string pointer = "/parameters/rotation";
+  const RotationParameters still;
+  double square = 0;
+  for (const double part : p.quaternion) square += part * part;
+  if (p.quaternion.size() != 4 || !(square > 1e-12 && square < 1e13))
+    checker.fault(pointer + "/quaternion", "range",
+                  "A quaternion is four numbers x, y, z, w of a length from 1e-6 to 3e6.");
+  if (!(std::fabs(p.yaw_degrees) <= 360))
+    checker.fault(pointer + "/yaw_degrees", "range", "yaw_degrees must be from -360 to 360.");
+  if (p.yaw_degrees != 0 && p.quaternion != still.quaternion)
+    checker.fault(pointer + "/yaw_degrees", "conflict",
+                  "A rotation is given by quaternion or by yaw_degrees, not by both.");
+}
+
+void check_layouts(const LayoutOrders& orders, Checker& checker) {
+  for (size_t product = 0; product < kLayoutProducts; ++product) {
+    if (!orders[product]) continue;
+    const LayoutOutput& order = *orders[product];
+    const MapLayout layout = layout_of(product, order);
+    const std::string pointer = std::string("/parameters/layouts/") + layout_product_name(product);
+    const bool wide = layout.kind == LayoutKind::latlong || layout.kind == LayoutKind::cylinder ||
+                      layout.kind == LayoutKind::cylinder_equal_area;
+    const std::string name = wide ? "width" : "size";
+    const bool borders = order.texel_convention == TexelConvention::openexr;
+    const int least = wide || borders || !is_cube(layout.kind) ? 2 : 1;
+    const int most = wide ? 8192 : is_cube(layout.kind) ? 2048 : 4096;
+    checker.between(order.size, least, most, pointer + "/" + name, name);
+    if (order.height) checker.between(*order.height, 1, 4096, pointer + "/height", "height");
+    check_distance(order.distance, pointer, checker);
+    if (wide && order.size % 2 != 0)
+      checker.fault(pointer + "/width", "range", "width must be even.");
+    if (layout.kind == LayoutKind::latlong && borders && order.size < 4)
+      checker.fault(pointer + "/width", "range", "width must be at least 4 with openexr.");
+  }
+}
+
 void check_environment_maps(const EnvironmentMapsParameters& p, Checker& checker) {
-  if (!p.sh && !p.irradiance && !p.prefilter && !p.dfg && !p.spectrum && !p.asset)
-    checker.fault("/parameters", "missing",
-                  "Order at least one of sh, irradiance, prefilter, dfg, spectrum and asset.");
+  if (!p.sh && !p.irradiance && !p.prefilter && !p.dfg && !p.spectrum && !p.asset &&
+      !any_layout(p.layouts))
+    checker.fault(
+        "/parameters", "missing",
+        "Order at least one of sh, irradiance, prefilter, dfg, spectrum, asset and layouts.");
+  check_source(p.source, checker);
+  check_rotation(p.rotation, checker);
+  check_layouts(p.layouts, checker);
   if (p.sh) check_sh(*p.sh, checker);
   if (p.spectrum) checker.between(p.spectrum->bands, 1, 129, "/parameters/spectrum/bands", "bands");
   if (p.irradiance)
@@ -189,6 +259,8 @@ void check_probe_bytes(const ProbesParameters& p, Checker& checker) {
 }
 
 void check_probes(const ProbesParameters& p, Checker& checker) {
+  check_source(p.source, checker);
+  check_rotation(p.rotation, checker);
   constexpr size_t kMostPositions = 10000;
   if (p.positions.empty() || p.positions.size() > kMostPositions)
     checker.fault(

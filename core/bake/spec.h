@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/bake/layout_orders.h"
 #include "core/base/math.h"
 #include "core/sphere/harmonic_exports.h"
 #include "core/sphere/harmonic_window.h"
@@ -79,12 +80,15 @@ struct AssetOutput {
 };
 
 struct EnvironmentMapsParameters {
+  SourceParameters source;
+  RotationParameters rotation;
   std::optional<ShOutput> sh;
   std::optional<IrradianceOutput> irradiance;
   std::optional<PrefilterOutput> prefilter;
   std::optional<DfgOutput> dfg;
   std::optional<SpectrumOutput> spectrum;
   std::optional<AssetOutput> asset;
+  LayoutOrders layouts;  // by product, see layout_orders.h
   // At least one of them is ordered.
 };
 
@@ -97,6 +101,8 @@ struct ProbeShOutput {
 };
 
 struct ProbesParameters {
+  SourceParameters source;      // of the environment
+  RotationParameters rotation;  // of the environment
   // World units, 1..10000 positions; fewer where cubes are large: see kMostProbeBytes.
   std::vector<Vec3d> positions;
   CubemapOutput cubemap;

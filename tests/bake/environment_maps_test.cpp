@@ -300,9 +300,9 @@ ErrorCode refusal(const std::vector<std::byte>& file) {
   return ErrorCode::internal;
 }
 
-TEST(EnvironmentMaps, RefusesWhatIsNotALatLongMap) {
+TEST(EnvironmentMaps, RefusesWhatIsNoEnvironmentMap) {
   EXPECT_EQ(refusal(exr_of(Image(48, 32, 3))), ErrorCode::invalid_input);
-  EXPECT_EQ(refusal(exr_of(Image(8, 48, 3), EnvmapAttribute::cube)), ErrorCode::invalid_input);
+  EXPECT_EQ(refusal(exr_of(Image(8, 40, 3), EnvmapAttribute::cube)), ErrorCode::invalid_input);
   EXPECT_EQ(refusal({std::byte{1}, std::byte{2}}), ErrorCode::invalid_input);
 }
 

@@ -1,0 +1,178 @@
+// The map in other layouts, converted from the file's own pixels.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/bake/maps_cost.h"
+#include "core/bake/maps_output.h"
+#include "core/base/text.h"
+#include "core/environment/layout_convert.h"
+#include "core/environment/resample.h"
+#include "core/image/exr.h"
+
+namespace lightkiln {
+
+namespace {
+
+std::string describe(const MapLayout& layout) {
+  const std::string side = layout.mirrored ? "left and right exchanged, +X to the right of +Z"
+                                           : "seen from inside, unmirrored, -X to the right of +Z";
+  switch (layout.kind) {
+    case LayoutKind::latlong:
+      return "latlong: centre +Z, +X a quarter left of it, top row +Y, seen from inside";
+    case LayoutKind::cube_strip:
+      return "cube: six faces from the top, +X -X +Y -Y +Z -Z, as OpenEXR orients them";
+    case LayoutKind::horizontal_cross:
+      return "horizontal cross: row +X +Z -X -Z, +Y above +Z, -Y below it, unfolded";
+    case LayoutKind::vertical_cross:
+      return "vertical cross: column +Y +Z -Y -Z, +X left and -X right of +Z, unfolded";
+    case LayoutKind::angular:
+      return "angular map: centre +Z, radius = angle / 180 degrees, " + side;
+    case LayoutKind::mirror_ball:
+      return "mirror ball: centre +Z, camera " +
+             (layout.camera_distance > 0
+                  ? "at " + short_number(layout.camera_distance) + " radii of the ball, "
+                  : std::string("infinitely far, ")) +
+             side;
+    case LayoutKind::octahedral:
+      return "octahedral (Cigolle et al. 2014) about z: column from x, row from y, centre +Z";
+    case LayoutKind::equal_area_octahedral:
+      return "equal-area octahedral (Clarberg 2008) about z: column from x, row from y, centre +Z";
+    case LayoutKind::hemisphere:
+      return "upper hemisphere: centre +Y, +Z at the bottom edge, radius = angle / 90 degrees";
+    case LayoutKind::hemisphere_equal_area:
+      return "upper hemisphere: centre +Y, +Z at the bottom edge, Lambert's equal-area projection";
+    case LayoutKind::cylinder:
+      return "cylinder about +Y: columns as latlong, rows equal steps of tan(latitude) up to " +
+             short_number(kPi * layout.height / layout.width);
+    case LayoutKind::cylinder_equal_area:
+      return "cylinder about +Y: columns as latlong, rows equal steps of sin(latitude)";
+  }
+  return "";
+}
+
+constexpr std::array<const char*, 6> kFaceNames = {"px", "nx", "py", "ny", "pz", "nz"};
+
+class LayoutImage : public MapsOutput {
+ public:
+  LayoutImage(size_t product, const LayoutOutput& order, const Environment& environment)
+      : product_(product), layout_(layout_of(product, order)) {
+    const bool moved = moves_texels(environment.source_layout, layout_, environment.rotation);
+    bound_ = moved || environment.constant ? 0 : kResampleError;
+  }
+
+  double error_bound() const override { return bound_; }
+
+  double model_seconds(MapsLight& light) const override {
+    const Image& source = light.environment().source_image();
+    return kConvertPerTexel * layout_.width * layout_.height +
+           kLookUpPerTexel * std::min(1e6, double(source.width) * source.height);
+  }
+
+  // Bytes: pixels, then what the round trip lost; it is measured when anything is to be checked.
+  MeasuredError make(MapsLight& light, int check_texels, ByteWriter& writer,
+                     Progress& progress) const override {
+    const Environment& environment = light.environment();
+    const MapLayout& from = environment.source_layout;
+    const Image& source = environment.source_image();
+    const Image image = convert_layout(from, source, layout_, environment.rotation,
+                                       MapFilter::adaptive, light.threads(), progress);
+    writer.floats(image.pixels);
+    writer.u64(check_texels > 0 ? 1 : 0);
+    if (check_texels == 0) return {};
+    const RoundTrip trip = measure_round_trip(from, source, layout_, image, environment.rotation,
+                                              light.threads(), progress);
+    writer.f64(trip.relative_rms);
+    writer.u64(trip.psnr_db ? 1 : 0);
+    writer.f64(trip.psnr_db.value_or(0));
+    writer.f64(trip.not_covered_share);
+    writer.f64(trip.mean_before);
+    writer.f64(trip.mean_after);
+    return {};
+  }
+
+  void file(ByteReader& reader, const MeasuredError&, Assembly* assembly,
+            EnvironmentDocument* document) const override {
+    Image image(layout_.width, layout_.height, 3);
+    reader.floats(image.pixels);
+    LayoutDocument entry;
+    entry.name = layout_product_name(product_);
+    entry.layout = layout_;
+    entry.error_bound = bound_;
+    if (reader.u64() != 0) entry.round_trip = read_trip(reader);
+    const std::string stem = "layout_" + entry.name;
+    if (product_ == kCubeFaces) {
+      for (int face = 0; face < 6; ++face) {
+        const std::string name = stem + "_" + kFaceNames[static_cast<size_t>(face)] + ".exr";
+        Image part(layout_.width, layout_.width, 3);
+        std::copy_n(image.at(0, face * layout_.width), part.pixels.size(), part.pixels.begin());
+        write(part, name, describe(layout_) + "; this file: face " + kFaceNames[size_t(face)],
+              EnvmapAttribute::none, assembly);
+        entry.artifacts.push_back(name);
+      }
+    } else {
+      const bool borders = layout_.convention == TexelConvention::openexr;
+      const EnvmapAttribute attribute = !borders ? EnvmapAttribute::none
+                                        : layout_.kind == LayoutKind::latlong
+                                            ? EnvmapAttribute::latlong
+                                            : EnvmapAttribute::cube;
+      write(image, stem + ".exr", describe(layout_), attribute, assembly);
+      entry.artifacts.push_back(stem + ".exr");
+    }
+    document->layouts.push_back(std::move(entry));
+  }
+
+ private:
+  static RoundTrip read_trip(ByteReader& reader) {
+    RoundTrip trip;
+    trip.relative_rms = reader.f64();
+    const bool lossy = reader.u64() != 0;
+    const double psnr_db = reader.f64();
+    if (lossy) trip.psnr_db = psnr_db;
+    trip.not_covered_share = reader.f64();
+    trip.mean_before = reader.f64();
+    trip.mean_after = reader.f64();
+    return trip;
+  }
+
+  // OpenEXR's attribute is written exactly where its texel centres are.
+  void write(const Image& image, const std::string& name, const std::string& layout,
+             EnvmapAttribute attribute, Assembly* assembly) const {
+    ExrWriteOptions options;
+    options.pixel_type = ExrPixelType::float32;
+    options.envmap = attribute;
+    options.attributes["lightkiln.layout"] = layout;
+    options.attributes["lightkiln.texel_convention"] =
+        attribute == EnvmapAttribute::none ? "half_texel: texel centres at (i + 1/2)/N"
+                                           : "openexr: texel centres at i/(N - 1)";
+    options.attributes["lightkiln.covered_share"] =
+        short_number(covered_solid_angle(layout_) / (4 * kPi));
+    assembly->artifacts.push_back({name, "image", "image/x-exr", write_exr(image, options)});
+  }
+
+  size_t product_;
+  MapLayout layout_;
+  double bound_;
+};
+
+bool any_ordered(const EnvironmentMapsParameters& parameters) {
+  return std::any_of(parameters.layouts.begin(), parameters.layouts.end(),
+                     [](const auto& order) { return order.has_value(); });
+}
+
+void order_layouts(const EnvironmentMapsParameters& parameters, MapsLight& light, double,
+                   MapsOutputs* outputs) {
+  for (size_t product = 0; product < kLayoutProducts; ++product) {
+    const std::optional<LayoutOutput>& order = parameters.layouts[product];
+    if (!order) continue;
+    outputs->push_back(std::make_unique<LayoutImage>(product, *order, light.environment()));
+  }
+}
+
+}  // namespace
+
+const MapsProduct kLayoutsProduct = {"layouts", "The map is ordered in other layouts.", true,
+                                     any_ordered, order_layouts};
+
+}  // namespace lightkiln
