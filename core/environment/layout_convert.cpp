@@ -140,7 +140,7 @@ class Gatherer {
       smooth = std::clamp(3 - 2 * std::ldexp(print.smaller, level), 0.0, 1.0);
     }
     if (smooth < 1) add_area(cell, points, 1 - smooth, sums);
-    if (smooth > 0) add_smooth(cell, points, print, smooth, sums);
+    if (smooth > 0) add_smooth(cell, points, print, smooth, level, sums);
   }
 
   void add_area(const Cell& cell, const std::array<GridPoint, 4>& points, double share,
@@ -163,12 +163,14 @@ class Gatherer {
     if (sums->omega == before) add_point(cell, sums);
   }
 
-  // At least four points per source texel's side, whose sum misses the integral of a bilinear tent
-  // by less than 1 / (4 pi)^2 of it, at places interpolated between the corners.
+  // Four points per source texel's side (no more than 64 per side of the whole texel), whose sum
+  // misses the integral of a bilinear tent by less than 1 / (4 pi)^2 of it, at places interpolated
+  // between the corners.
   void add_smooth(const Cell& cell, const std::array<GridPoint, 4>& p, const Footprint& print,
-                  double share, Sums* sums) {
-    const int columns = std::clamp(static_cast<int>(std::ceil(4 * print.along_x)), 1, 64);
-    const int rows = std::clamp(static_cast<int>(std::ceil(4 * print.along_y)), 1, 64);
+                  double share, int level, Sums* sums) {
+    const int most = std::max(1, 64 >> level);  // a texel's side
+    const int columns = std::clamp(static_cast<int>(std::ceil(4 * print.along_x)), 1, most);
+    const int rows = std::clamp(static_cast<int>(std::ceil(4 * print.along_y)), 1, most);
     const double weight = share * target_omega(cell) / (columns * rows);
     int chart = 0;
     for (const Corner& corner : cell.corners) chart = std::max(chart, corner.place.chart);

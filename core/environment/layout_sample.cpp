@@ -90,7 +90,7 @@ Vec3d smooth_radiance(const MapLayout& layout, const Image& image, const MapPlac
   // The whole rim is one direction: over the last texel the value goes over to the rim's mean.
   const double share = std::clamp(radius - (half - 1), 0.0, 1.0);
   if (share == 0) return inner;
-  constexpr int kRimPlaces = 8;
+  constexpr int kRimPlaces = 4;
   Vec3d rim;
   for (int k = 0; k < kRimPlaces; ++k) {
     const double angle = 2 * kPi * (k + 0.5) / kRimPlaces;

@@ -228,7 +228,13 @@ bool layout_covers(const MapLayout& layout, const Vec3d& direction) {
 }
 
 bool texel_has_direction(const MapLayout& layout, int x, int y) {
-  return layout_direction(layout, x + 0.5, y + 0.5).has_value();
+  if (is_cube(layout.kind)) {
+    const int size = cube_face_size(layout);
+    return face_at(layout.kind, x / size, y / size) >= 0;
+  }
+  if (!is_radial(layout.kind)) return true;
+  const double right = (2 * x + 1.0) / layout.width - 1, down = (2 * y + 1.0) / layout.height - 1;
+  return right * right + down * down <= 1;
 }
 
 namespace {
