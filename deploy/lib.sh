@@ -16,8 +16,8 @@ runtime_packages=(
   libseccomp2 libsqlite3-0 libssl3 libstdc++6 libtbb12 zlib1g
 )
 test_packages=(
-  chromium curl libbenchmark-dev libgtest-dev librapidcheck-dev openexr openimageio-tools pfstools strace
-  wrk
+  chromium curl libbenchmark-dev libgtest-dev librapidcheck-dev openexr openimageio-tools pfstools
+  strace wrk
 )
 
 say() { printf '%s\n' "$*" >&2; }
