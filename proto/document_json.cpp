@@ -150,6 +150,28 @@ void write_asset(JsonWriter& writer, const AssetDocument& document) {
   writer.end_array().end_object();
 }
 
+void write_irradiance(JsonWriter& writer, const IrradianceDocument& irradiance) {
+  writer.member("quantity", "irradiance")
+      .member("method", irradiance.bands ? "harmonics" : "exact");
+  if (!irradiance.bands) return;
+  writer.member("bands", *irradiance.bands).key("omitted");
+  writer.begin_object()
+      .member("rms", irradiance.omitted_rms)
+      .member("most", irradiance.omitted_most)
+      .end_object();
+}
+
+void write_chain(JsonWriter& writer, const char* name, const std::vector<MapDocument>& levels) {
+  writer.key(name).begin_array();
+  for (const MapDocument& level : levels)
+    write_map(writer, level, [&] {
+      writer.member("level", level.level)
+          .member("roughness", level.roughness)
+          .member("alpha", level.roughness * level.roughness);
+    });
+  writer.end_array();
+}
+
 void write_environment(JsonWriter& writer, const EnvironmentDocument& document) {
   write_radiance_convention(writer);
   writer.key("source")
@@ -175,18 +197,18 @@ void write_environment(JsonWriter& writer, const EnvironmentDocument& document) 
   write_harmonics(writer, document);
   writer.key("irradiance");
   if (document.irradiance)
-    write_map(writer, *document.irradiance, [&] { writer.member("quantity", "irradiance"); });
+    write_map(writer, *document.irradiance,
+              [&] { write_irradiance(writer, *document.irradiance); });
   else
     writer.null();
-  writer.key("prefilter").begin_array();
-  for (const MapDocument& level : document.prefilter)
-    write_map(writer, level, [&] {
-      writer.member("roughness", level.roughness)
-          .member("alpha", level.roughness * level.roughness);
-    });
-  writer.end_array().key("dfg");
+  write_chain(writer, "prefilter", document.prefilter);
+  write_chain(writer, "sheen", document.sheen);
+  writer.key("dfg");
   if (document.dfg)
-    write_map(writer, *document.dfg, [] {});
+    write_map(writer, *document.dfg, [&] {
+      writer.member("multiple_scattering", document.dfg->multiple_scattering)
+          .member("charlie", document.dfg->charlie);
+    });
   else
     writer.null();
   writer.key("asset");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/environment/charlie_lobe.h"
 #include "proto/spec_layouts.h"
 
 namespace lightkiln {
@@ -158,6 +159,103 @@ ParameterGroup maps_sh_group() {
       [](Spec& s) { parameters<Maps>(s).sh.emplace(); }};
 }
 
+ParameterGroup irradiance_group() {
+  return {"/parameters/irradiance",
+          {{"size",
+            +[](Spec& s) -> int& { return parameters<Maps>(s).irradiance->size; },
+            {1, 1024},
+            false,
+            "Texels along a face's side. Cost grows with its square."},
+           {"method",
+            NameMember{{"exact", "harmonics"},
+                       [](const Spec& s) {
+                         return static_cast<size_t>(parameters<Maps>(s).irradiance->method);
+                       },
+                       [](Spec& s, size_t i) {
+                         parameters<Maps>(s).irradiance->method = IrradianceMethod(i);
+                       }},
+            {},
+            false,
+            "exact: the whole map under the clamped cosine. harmonics: its first bands alone, as "
+            "engines keep them, with what that leaves out."},
+           {"bands",
+            +[](Spec& s) -> std::optional<int>& { return parameters<Maps>(s).irradiance->bands; },
+            Range{1, 33}, false, "Of the method harmonics; null = 3. Refused by exact."}},
+          [](const Spec& s) { return parameters<Maps>(s).irradiance.has_value(); },
+          [](Spec& s) { parameters<Maps>(s).irradiance.emplace(); }};
+}
+
+// The chains are alike but for their lobe and the lowest roughness that it has.
+template <auto kChain>
+ParameterGroup chain_group(std::string_view path, double least_roughness) {
+  return {path,
+          {{"size",
+            +[](Spec& s) -> int& { return (parameters<Maps>(s).*kChain)->size; },
+            {8, 2048},
+            false,
+            "Texels along a face's side of level 0, a power of two."},
+           {"levels",
+            +[](Spec& s) -> int& { return (parameters<Maps>(s).*kChain)->levels; },
+            {2, 12},
+            false,
+            "Levels; each halves the size. The last level has at least one texel."},
+           {"roughness_scale",
+            NameMember{{"linear", "filament", "unity", "custom"},
+                       [](const Spec& s) {
+                         return static_cast<size_t>((parameters<Maps>(s).*kChain)->roughness_scale);
+                       },
+                       [](Spec& s, size_t i) {
+                         (parameters<Maps>(s).*kChain)->roughness_scale = RoughnessScale(i);
+                       }},
+            {},
+            false,
+            "The level, as a share of the last, that an engine looks up for roughness r: linear r, "
+            "filament r (2 - r), unity r (1.7 - 0.7 r); custom: the list roughness. A level of low "
+            "roughness costs most."},
+           {"roughness",
+            NumbersMember{[](Spec& s) -> std::vector<double>& {
+                            return (parameters<Maps>(s).*kChain)->roughness;
+                          },
+                          0, 12},
+            {least_roughness, 1},
+            false,
+            "Of roughness_scale custom: one a level, in any order. Empty and refused otherwise."},
+           {"packaging",
+            NameMember{
+                {"files", "mip_mapped"},
+                [](const Spec& s) {
+                  return static_cast<size_t>((parameters<Maps>(s).*kChain)->packaging);
+                },
+                [](Spec& s, size_t i) { (parameters<Maps>(s).*kChain)->packaging = Packaging(i); }},
+            {},
+            false,
+            "files: one OpenEXR file a level. mip_mapped: one file of all levels."}},
+          [](const Spec& s) { return (parameters<Maps>(s).*kChain).has_value(); },
+          [](Spec& s) { (parameters<Maps>(s).*kChain).emplace(); }};
+}
+
+ParameterGroup dfg_group() {
+  return {"/parameters/dfg",
+          {{"size",
+            +[](Spec& s) -> int& { return parameters<Maps>(s).dfg->size; },
+            {8, 1024},
+            false,
+            "Texels a side of the split-sum table."},
+           {"multiple_scattering",
+            +[](Spec& s) -> bool& { return parameters<Maps>(s).dfg->multiple_scattering; },
+            {},
+            false,
+            "false: R scale of F0, G bias. true: R bias, G their sum E, from which reflected = (F0 "
+            "(G - R) + R) (1 + F0 (1/G - 1)) gives back what single scattering loses."},
+           {"charlie",
+            +[](Spec& s) -> bool& { return parameters<Maps>(s).dfg->charlie; },
+            {},
+            false,
+            "B: the albedo of Charlie sheen; 0 otherwise."}},
+          [](const Spec& s) { return parameters<Maps>(s).dfg.has_value(); },
+          [](Spec& s) { parameters<Maps>(s).dfg.emplace(); }};
+}
+
 KindTable environment_maps_table() {
   std::vector<ParameterGroup> groups = {without(root_group(), {"seed"}),
                                         without(accuracy_group(), {"max_samples", "max_seconds"}),
@@ -165,37 +263,10 @@ KindTable environment_maps_table() {
   groups.push_back(maps_source_group());
   groups.push_back(maps_rotation_group());
   groups.push_back(maps_sh_group());
-  groups.push_back({"/parameters/irradiance",
-                    {{"size",
-                      +[](Spec& s) -> int& { return parameters<Maps>(s).irradiance->size; },
-                      {1, 1024},
-                      false,
-                      "Texels along a face's side. Cost grows with its square."}},
-                    [](const Spec& s) { return parameters<Maps>(s).irradiance.has_value(); },
-                    [](Spec& s) { parameters<Maps>(s).irradiance.emplace(); }});
-  groups.push_back(
-      {"/parameters/prefilter",
-       {{"size",
-         +[](Spec& s) -> int& { return parameters<Maps>(s).prefilter->size; },
-         {8, 2048},
-         false,
-         "Texels along a face's side of level 0, a power of two."},
-        {"levels",
-         +[](Spec& s) -> int& { return parameters<Maps>(s).prefilter->levels; },
-         {2, 12},
-         false,
-         "Levels; each halves the size, and roughness runs linearly from 0 to 1. The last level "
-         "has at least one texel."}},
-       [](const Spec& s) { return parameters<Maps>(s).prefilter.has_value(); },
-       [](Spec& s) { parameters<Maps>(s).prefilter.emplace(); }});
-  groups.push_back({"/parameters/dfg",
-                    {{"size",
-                      +[](Spec& s) -> int& { return parameters<Maps>(s).dfg->size; },
-                      {8, 1024},
-                      false,
-                      "Texels a side of the split-sum table."}},
-                    [](const Spec& s) { return parameters<Maps>(s).dfg.has_value(); },
-                    [](Spec& s) { parameters<Maps>(s).dfg.emplace(); }});
+  groups.push_back(irradiance_group());
+  groups.push_back(chain_group<&Maps::prefilter>("/parameters/prefilter", 0));
+  groups.push_back(chain_group<&Maps::sheen>("/parameters/sheen", kMinSheenRoughness));
+  groups.push_back(dfg_group());
   groups.push_back(
       {"/parameters/spectrum",
        {{"bands", +[](Spec& s) -> int& { return parameters<Maps>(s).spectrum->bands; }, kMapBands,
@@ -224,7 +295,7 @@ KindTable environment_maps_table() {
        [](Spec& s) { parameters<Maps>(s).asset.emplace(); }});
   for (ParameterGroup& group : layout_groups()) groups.push_back(std::move(group));
   return {Kind::environment_maps,
-          "Coefficients, irradiance, a GGX-prefiltered chain and the DFG table of an environment "
+          "Coefficients, irradiance, prefiltered chains and the DFG table of an environment "
           "map, and the map in any layout.",
           {{"environment", &Spec::environment, true}},
           groups};

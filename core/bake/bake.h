@@ -95,6 +95,16 @@ struct MapDocument {
   double roughness = 0;    // of a prefiltered level
   double error_bound = 0;  // rms over the sphere, relative to the output's mean; DFG: absolute
   MeasuredError measured;
+  int level = 0;  // of a chain; in a mip-mapped file its place
+};
+// Irradiance of the first bands alone differs from the whole by this much of its mean.
+struct IrradianceDocument : MapDocument {
+  std::optional<int> bands;  // none = all
+  double omitted_rms = 0, omitted_most = 0;
+};
+struct DfgDocument : MapDocument {
+  bool multiple_scattering = false;
+  bool charlie = false;
 };
 struct SpectrumDocument {
   ShSpectrum spectrum;
@@ -142,9 +152,9 @@ struct EnvironmentDocument {
   std::vector<ShExport> sh_exports;
   std::optional<SpectrumDocument> spectrum;
   std::vector<LayoutDocument> layouts;
-  std::optional<MapDocument> irradiance;
-  std::vector<MapDocument> prefilter;  // levels from the sharpest
-  std::optional<MapDocument> dfg;
+  std::optional<IrradianceDocument> irradiance;
+  std::vector<MapDocument> prefilter, sheen;  // levels as ordered
+  std::optional<DfgDocument> dfg;
   std::optional<AssetDocument> asset;
 };
 

@@ -18,6 +18,7 @@ inline constexpr double kResamplePerCell = 1.3e-8;
 inline constexpr double kConvertPerTexel = 1.5e-6;  // of another layout
 inline constexpr double kLookUpPerTexel = 2.5e-7;   // of the source, for the round trip
 inline constexpr double kPerDfgValue = 2.8e-6;
+inline constexpr double kPerCharlieValue = 2.3e-6;
 inline constexpr double kRgbdPerTexel = 4e-7;   // packing and writing PNG
 inline constexpr double kBrutePerTexel = 5e-9;  // of the map, each texel that is checked
 

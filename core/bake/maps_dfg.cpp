@@ -3,6 +3,7 @@
 #include "core/bake/maps_cost.h"
 #include "core/bake/maps_output.h"
 #include "core/base/parallel.h"
+#include "core/environment/charlie_albedo.h"
 #include "core/environment/dfg.h"
 #include "core/image/exr.h"
 
@@ -12,14 +13,19 @@ namespace {
 
 class DfgTable : public MapsOutput {
  public:
-  explicit DfgTable(int size) : size_(size) {}
+  explicit DfgTable(const DfgOutput& order)
+      : size_(order.size), options_{order.multiple_scattering, order.charlie} {}
 
-  double error_bound() const override { return kDfgErrorBound; }
-  double model_seconds(MapsLight&) const override { return kPerDfgValue * size_ * size_; }
+  double error_bound() const override {
+    return std::max(kDfgErrorBound, options_.charlie ? kCharlieAlbedoErrorBound : 0.0);
+  }
+  double model_seconds(MapsLight&) const override {
+    return (kPerDfgValue + (options_.charlie ? kPerCharlieValue : 0)) * size_ * size_;
+  }
 
   MeasuredError make(MapsLight& light, int check_texels, ByteWriter& writer,
                      Progress& progress) const override {
-    const Image table = dfg_table(size_, {}, light.threads(), progress);
+    const Image table = dfg_table(size_, options_, light.threads(), progress);
     writer.floats(table.pixels);
     ErrorMeter meter(1);
     constexpr int kTwinRefinement = 8;
@@ -28,8 +34,19 @@ class DfgTable : public MapsOutput {
       const size_t index = check_index(i, side * side);
       const int x = static_cast<int>(index % side), y = static_cast<int>(index / side);
       const double roughness = (y + 0.5) / size_;
-      const DfgValue truth = ggx_dfg(roughness * roughness, (x + 0.5) / size_, kTwinRefinement);
-      meter.add(to_double(table.rgb(x, y)), {truth.scale, truth.bias, 0});
+      const double alpha = roughness * roughness, cosine = (x + 0.5) / size_;
+      const DfgValue value = ggx_dfg(alpha, cosine, kTwinRefinement);
+      const double white = value.scale + value.bias;
+      Vec3d truth = options_.multiple_scattering ? Vec3d{value.bias, white, 0}
+                                                 : Vec3d{value.scale, value.bias, 0};
+      Vec3d found = to_double(table.rgb(x, y));
+      if (options_.charlie) {
+        // Sheen's albedo may exceed 1 and is held to its bound relative to itself there.
+        const double albedo = charlie_albedo(alpha, cosine, kTwinRefinement);
+        truth.z = albedo / std::max(1.0, albedo);
+        found.z /= std::max(1.0, albedo);
+      }
+      meter.add(found, truth);
     }
     return meter.result();
   }
@@ -41,19 +58,30 @@ class DfgTable : public MapsOutput {
     ExrWriteOptions options;
     options.pixel_type = ExrPixelType::float32;
     options.attributes["lightkiln.axes"] =
-        "column: n.v = (x + 1/2)/size; row: roughness = (y + 1/2)/size from the top; R: scale of "
-        "F0, G: bias";
+        "column: n.v = (x + 1/2)/size; row: roughness = (y + 1/2)/size from the top";
+    options.attributes["lightkiln.channels"] = channels();
     assembly->artifacts.push_back({"dfg.exr", "image", "image/x-exr", write_exr(table, options)});
-    document->dfg = MapDocument{"dfg.exr", size_, 0, kDfgErrorBound, measured};
+    document->dfg = DfgDocument{{"dfg.exr", size_, 0, error_bound(), measured},
+                                options_.multiple_scattering,
+                                options_.charlie};
   }
 
  private:
+  std::string channels() const {
+    return std::string(options_.multiple_scattering
+                           ? "R: bias, G: E = scale + bias; reflected = (F0 (G - R) + R) (1 + F0 "
+                             "(1/G - 1))"
+                           : "R: scale of F0, G: bias; reflected = F0 R + G") +
+           (options_.charlie ? "; B: albedo of Charlie sheen" : "; B: 0");
+  }
+
   int size_;
+  DfgTableOptions options_;
 };
 
 void order_dfg(const EnvironmentMapsParameters& parameters, MapsLight&, double,
                MapsOutputs* outputs) {
-  outputs->push_back(std::make_unique<DfgTable>(parameters.dfg->size));
+  outputs->push_back(std::make_unique<DfgTable>(*parameters.dfg));
 }
 
 }  // namespace

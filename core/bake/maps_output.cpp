@@ -8,9 +8,9 @@
 namespace lightkiln {
 
 std::span<const MapsProduct> maps_products() {
-  static const MapsProduct products[] = {kShProduct,     kIrradianceProduct, kPrefilterProduct,
-                                         kDfgProduct,    kSpectrumProduct,   kAssetProduct,
-                                         kLayoutsProduct};
+  static const MapsProduct products[] = {kShProduct,    kIrradianceProduct, kPrefilterProduct,
+                                         kSheenProduct, kDfgProduct,        kSpectrumProduct,
+                                         kAssetProduct, kLayoutsProduct};
   return products;
 }
 
@@ -90,10 +90,11 @@ void judge_output(double bound, const MeasuredError& measured, double target, Ch
     ++round->converged;
 }
 
+namespace {
+
 // Half-texel centres are what engines sample. OpenEXR's `envmap` attribute would claim centres on
 // the borders and is therefore not written; these attributes say what the file is.
-Artifact cube_artifact(const std::string& name, const Image& cube,
-                       std::map<std::string, std::string> attributes) {
+ExrWriteOptions cube_options(std::map<std::string, std::string> attributes) {
   ExrWriteOptions options;
   options.pixel_type = ExrPixelType::float32;
   options.attributes = std::move(attributes);
@@ -102,7 +103,20 @@ Artifact cube_artifact(const std::string& name, const Image& cube,
                              "them");
   options.attributes.emplace("lightkiln.texel_convention",
                              "half_texel: texel centres at (i + 1/2)/N of a face");
-  return {name, "image", "image/x-exr", write_exr(cube, options)};
+  return options;
+}
+
+}  // namespace
+
+Artifact cube_artifact(const std::string& name, const Image& cube,
+                       std::map<std::string, std::string> attributes) {
+  return {name, "image", "image/x-exr", write_exr(cube, cube_options(std::move(attributes)))};
+}
+
+Artifact mip_mapped_cube_artifact(const std::string& name, std::span<const Image> levels,
+                                  std::map<std::string, std::string> attributes) {
+  return {name, "image", "image/x-exr",
+          write_exr_mipmapped(levels, cube_options(std::move(attributes)))};
 }
 
 }  // namespace lightkiln

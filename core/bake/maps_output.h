@@ -94,10 +94,14 @@ void judge_output(double bound, const MeasuredError& measured, double target, Ch
 // Artifacts that are cubes, as six faces in one strip, with text attributes saying so.
 Artifact cube_artifact(const std::string& name, const Image& cube,
                        std::map<std::string, std::string> attributes);
+// All levels of a chain in one file.
+Artifact mip_mapped_cube_artifact(const std::string& name, std::span<const Image> levels,
+                                  std::map<std::string, std::string> attributes);
 
 extern const MapsProduct kShProduct;
 extern const MapsProduct kIrradianceProduct;
 extern const MapsProduct kPrefilterProduct;
+extern const MapsProduct kSheenProduct;
 extern const MapsProduct kDfgProduct;
 extern const MapsProduct kSpectrumProduct;
 extern const MapsProduct kAssetProduct;

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <string_view>
 
+#include "core/base/text.h"
+#include "core/environment/charlie_lobe.h"
+
 namespace lightkiln {
 
 const char* kind_name(Kind kind) {
@@ -211,20 +214,67 @@ void check_layouts(const LayoutOrders& orders, Checker& checker) {
   }
 }
 
-void check_environment_maps(const EnvironmentMapsParameters& p, Checker& checker) {
-  if (!p.sh && !p.irradiance && !p.prefilter && !p.dfg && !p.spectrum && !p.asset &&
-      !any_layout(p.layouts))
+void check_irradiance(const IrradianceOutput& irradiance, Checker& checker) {
+  checker.between(irradiance.size, 1, 1024, "/parameters/irradiance/size", "size");
+  if (!irradiance.bands) return;
+  checker.between(*irradiance.bands, 1, 33, "/parameters/irradiance/bands", "bands");
+  if (irradiance.method == IrradianceMethod::exact)
+    checker.fault("/parameters/irradiance/bands", "conflict",
+                  "bands belongs to the method harmonics only: exact has no band limit.");
+}
+
+// Custom chains name the roughness of every level, the others none.
+void check_roughness(const PrefilterOutput& chain, double least, const std::string& pointer,
+                     Checker& checker) {
+  const size_t count = chain.roughness.size();
+  if (chain.roughness_scale != RoughnessScale::custom) {
+    if (count > 0)
+      checker.fault(pointer, "conflict", "roughness belongs to the roughness_scale custom only.");
+    return;
+  }
+  if (count == 0)
+    checker.fault(pointer, "missing", "The roughness_scale custom needs a list of roughness.");
+  else if (count != static_cast<size_t>(chain.levels))
+    checker.fault(pointer, "conflict",
+                  "There are " + std::to_string(count) + " roughnesses for " +
+                      std::to_string(chain.levels) + " levels; each level needs one.");
+  for (size_t i = 0; i < count; ++i) {
+    const double value = chain.roughness[i];
+    if (!(value >= least && value <= 1))
+      checker.fault(pointer + "/" + std::to_string(i), "range",
+                    "A roughness is at least " + short_number(least) + " and at most 1.");
+  }
+}
+
+void check_chain(const PrefilterOutput& chain, double least_roughness, const std::string& pointer,
+                 Checker& checker) {
+  const int size = chain.size, levels = chain.levels;
+  if (size < 8 || size > 2048 || !std::has_single_bit(static_cast<unsigned int>(size)))
     checker.fault(
-        "/parameters", "missing",
-        "Order at least one of sh, irradiance, prefilter, dfg, spectrum, asset and layouts.");
+        pointer + "/size", "range",
+        "size is " + std::to_string(size) + "; allowed are the powers of two from 8 to 2048.");
+  checker.between(levels, 2, 12, pointer + "/levels", "levels");
+  if (levels >= 2 && levels <= 12 && size >= 8 && (size >> (levels - 1)) < 1)
+    checker.fault(pointer + "/levels", "conflict",
+                  "A size of " + std::to_string(size) + " has no " + std::to_string(levels) +
+                      " levels: each is half the one before and the last is at least 1.");
+  check_roughness(chain, least_roughness, pointer + "/roughness", checker);
+}
+
+void check_environment_maps(const EnvironmentMapsParameters& p, Checker& checker) {
+  if (!p.sh && !p.irradiance && !p.prefilter && !p.sheen && !p.dfg && !p.spectrum && !p.asset &&
+      !any_layout(p.layouts))
+    checker.fault("/parameters", "missing",
+                  "Order at least one of sh, irradiance, prefilter, sheen, dfg, spectrum, asset "
+                  "and layouts.");
   check_source(p.source, checker);
   check_rotation(p.rotation, checker);
   check_layouts(p.layouts, checker);
   if (p.sh) check_sh(*p.sh, checker);
   if (p.spectrum) checker.between(p.spectrum->bands, 1, 129, "/parameters/spectrum/bands", "bands");
-  if (p.irradiance)
-    checker.between(p.irradiance->size, 1, 1024, "/parameters/irradiance/size", "size");
+  if (p.irradiance) check_irradiance(*p.irradiance, checker);
   if (p.dfg) checker.between(p.dfg->size, 8, 1024, "/parameters/dfg/size", "size");
+  if (p.prefilter) check_chain(*p.prefilter, 0, "/parameters/prefilter", checker);
   if (p.asset) {
     const int side = p.asset->size;
     if (side < 32 || side > 1024 || !std::has_single_bit(static_cast<unsigned int>(side)))
@@ -232,17 +282,7 @@ void check_environment_maps(const EnvironmentMapsParameters& p, Checker& checker
           "/parameters/asset/size", "range",
           "size is " + std::to_string(side) + "; allowed are the powers of two from 32 to 1024.");
   }
-  if (!p.prefilter) return;
-  const auto [size, levels] = *p.prefilter;
-  if (size < 8 || size > 2048 || !std::has_single_bit(static_cast<unsigned int>(size)))
-    checker.fault(
-        "/parameters/prefilter/size", "range",
-        "size is " + std::to_string(size) + "; allowed are the powers of two from 8 to 2048.");
-  checker.between(levels, 2, 12, "/parameters/prefilter/levels", "levels");
-  if (levels >= 2 && levels <= 12 && size >= 8 && (size >> (levels - 1)) < 1)
-    checker.fault("/parameters/prefilter/levels", "conflict",
-                  "A size of " + std::to_string(size) + " has no " + std::to_string(levels) +
-                      " levels: each is half the one before and the last is at least 1.");
+  if (p.sheen) check_chain(*p.sheen, kMinSheenRoughness, "/parameters/sheen", checker);
 }
 
 // What can be held is told by the number of positions, whose cubes the other parameters size.

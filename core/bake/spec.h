@@ -12,6 +12,7 @@
 
 #include "core/bake/layout_orders.h"
 #include "core/base/math.h"
+#include "core/environment/roughness_scale.h"
 #include "core/sphere/harmonic_exports.h"
 #include "core/sphere/harmonic_window.h"
 
@@ -55,16 +56,35 @@ struct ShOutput {
 struct SpectrumOutput {
   int bands = 33;  // 1..129 rows; cost as of as many bands of SH
 };
+enum class IrradianceMethod {
+  exact,      // the whole map under the clamped cosine
+  harmonics,  // its first bands alone, as engines keep them
+};
 struct IrradianceOutput {
   int size = 64;  // texels a face side, 1..1024; cost grows with size^2
+  IrradianceMethod method = IrradianceMethod::exact;
+  // Of harmonics, 1..33; none = 3. Refused by exact.
+  std::optional<int> bands = {};
 };
+enum class Packaging {
+  files,       // one file a level
+  mip_mapped,  // one file of all levels
+};
+// A chain of cubes, each half the size of the one before: GGX (prefilter) or Charlie (sheen).
 struct PrefilterOutput {
   int size = 256;  // texels a face side of level 0, power of two, 8..2048
-  int levels =
-      5;  // 2..12, size >> (levels - 1) >= 1; roughness is linear from 0 to 1 over the levels
+  int levels = 5;  // 2..12, size >> (levels - 1) >= 1
+  // How roughness runs from 0 to 1 over the levels. Low ones cost most.
+  RoughnessScale roughness_scale = RoughnessScale::linear;
+  // Of custom, one a level, 0..1 (sheen: 0.1..1). Empty and refused otherwise.
+  std::vector<double> roughness = {};
+  Packaging packaging = Packaging::files;
 };
 struct DfgOutput {
   int size = 128;  // texels a side, 8..1024
+  // Channels for energy compensation instead of the plain split sum.
+  bool multiple_scattering = false;
+  bool charlie = false;  // sheen's albedo in the third channel, which is 0 otherwise
 };
 
 // Which roughness a level of the asset holds.
@@ -85,6 +105,7 @@ struct EnvironmentMapsParameters {
   std::optional<ShOutput> sh;
   std::optional<IrradianceOutput> irradiance;
   std::optional<PrefilterOutput> prefilter;
+  std::optional<PrefilterOutput> sheen;
   std::optional<DfgOutput> dfg;
   std::optional<SpectrumOutput> spectrum;
   std::optional<AssetOutput> asset;

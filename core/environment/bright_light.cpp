@@ -47,6 +47,39 @@ std::vector<double> cut_table(const ZonalKernel& kernel, const std::vector<doubl
   return table;
 }
 
+// The mean of the table over a square cell of side `extent` about each of its angles. A square has
+// the same second moment extent^2 / 12 in every direction: along the angle the mean over an
+// interval of that length, which also rounds the kink, and across it extent^2 / 24 cot(t) K'(t).
+std::vector<double> cell_means(const std::vector<double>& table, double extent) {
+  const int steps = static_cast<int>(table.size()) - 2;
+  const double step = kPi / steps, half = 0.5 * extent / step;
+  const auto at = [&](int i) {
+    const int mirrored = i < 0 ? -i : i > steps ? 2 * steps - i : i;
+    return table[static_cast<size_t>(mirrored)];
+  };
+  // sums[i + margin]: the integral of the interpolated table up to point i, in steps.
+  const int margin = static_cast<int>(std::ceil(half)) + 2;
+  std::vector<double> sums{0};
+  for (int i = -margin; i < steps + margin; ++i)
+    sums.push_back(sums.back() + 0.5 * (at(i) + at(i + 1)));
+  const auto integral = [&](double place) {
+    const int i = static_cast<int>(std::floor(place));
+    const double f = place - i;
+    return sums[static_cast<size_t>(i + margin)] + f * at(i) + 0.5 * f * f * (at(i + 1) - at(i));
+  };
+  std::vector<double> means = table;
+  for (int i = 0; i <= steps; ++i) {
+    const double slope = (at(i + 1) - at(i - 1)) / (2 * step), angle = step * i;
+    const double bend = (at(i + 1) - 2 * at(i) + at(i - 1)) / (step * step);
+    const bool pole = i == 0 || i == steps;  // where cot(t) K' tends to K''
+    const double across = pole ? bend : slope / std::tan(angle);
+    means[static_cast<size_t>(i)] =
+        (integral(i + half) - integral(i - half)) / (2 * half) + extent * extent / 24 * across;
+  }
+  means.back() = means[static_cast<size_t>(steps)];
+  return means;
+}
+
 // A texel acts as a point on bands l while l times its extent is small; larger ones are cut into
 // this many a side, as long as the points stay few.
 constexpr double kMaxPoints = 384;
@@ -59,22 +92,31 @@ int point_cuts(const LightStatistics& light, int bands) {
 
 }  // namespace
 
+// Cells are squares of colatitude and longitude, narrowed by the sine of the colatitude; the mean
+// extent of the brightest stands for all.
 CutLight::CutLight(const LightStatistics& light, const ZonalKernel& kernel,
-                   const std::vector<double>& responses)
-    : table_(cut_table(kernel, responses)) {
+                   const std::vector<double>& responses) {
   const int cuts = point_cuts(light, static_cast<int>(responses.size()));
   for (const BrightTexel& texel : light.bright) {
     double u = 0, v = 0;
     latlong_coordinates(texel.direction, &u, &v);
-    const double dv = texel.extent_rad / kPi, du = dv / 2;  // texels of a 2:1 map are square
+    const double dv = texel.extent_rad / kPi / cuts, du = dv / 2;  // texels of a 2:1 map are square
+    double all = 0;
+    for (int j = 0; j < cuts; ++j) all += cuts * std::sin(kPi * (v + dv * (j + 0.5 - 0.5 * cuts)));
     for (int j = 0; j < cuts; ++j) {
+      const double middle = v + dv * (j + 0.5 - 0.5 * cuts), sine = std::sin(kPi * middle);
+      // A cell's centre of mass lies a little towards the equator.
+      const double centre = middle + kPi * dv * dv / 12 * std::cos(kPi * middle) / sine;
       for (int i = 0; i < cuts; ++i) {
-        const Vec3d direction =
-            latlong_direction(u + du * ((i + 0.5) / cuts - 0.5), v + dv * ((j + 0.5) / cuts - 0.5));
-        points_.push_back({direction, texel.energy / (cuts * cuts)});
+        points_.push_back({latlong_direction(u + du * (i + 0.5 - 0.5 * cuts), centre),
+                           texel.energy * (sine / all)});
       }
     }
   }
+  const BrightTexel& brightest = light.bright.front();
+  const double sine2 = 1 - brightest.direction.y * brightest.direction.y;
+  table_ = cell_means(cut_table(kernel, responses),
+                      brightest.extent_rad / cuts * std::sqrt((1 + sine2) / 2));
 }
 
 Vec3d CutLight::at(const Vec3d& direction) const {

@@ -70,7 +70,9 @@ Image convolve_lobe(const Environment& environment, const LightStatistics& light
             double most = 0;
             for (int c = 0; c < 3; ++c) {
               const double inside =
-                  std::clamp(value[c], double(light.lowest[c]), double(light.highest[c]));
+                  lobe.within_range
+                      ? std::clamp(value[c], double(light.lowest[c]), double(light.highest[c]))
+                      : value[c];
               most = std::max(most, std::abs(inside - value[c]) / light.mean_luminance);
               cube.at(x, line)[c] = static_cast<float>(inside);
             }

@@ -30,6 +30,8 @@ struct LobePlan {
   std::vector<double> responses;  // h_l for l < bands, of the lobe or of its halo
   double error_bound = 0;         // rms over the sphere, relative to the mean
   double uncorrected_bound = 0;   // what it would be without the correction
+  // The truth lies in the map's range, so that results are cut back into it.
+  bool within_range = true;
 };
 // The fewest bands whose bound stays at or under `target` (relative rms). Where no allowed number
 // does, the most are taken, and error_bound, then above `target`, says what that gives.
@@ -37,6 +39,18 @@ inline constexpr int kMaxBands = 1400;
 // GGX lobes that would need more bands than these are split.
 inline constexpr int kSplitBands = 800;
 LobePlan plan_lobe(const LightStatistics& light, const Lobe& lobe, double target);
+
+// The first `bands` bands of irradiance over pi and no more, as engines keep them: below 0 in
+// places where a map's light is hard.
+LobePlan plan_irradiance_bands(const LightStatistics& light, int bands);
+// What the first `bands` bands of irradiance lack: rms over the sphere, and a bound on it in any
+// direction, relative to the mean. `spectrum` holds at least as many bands.
+struct OmittedLight {
+  double rms = 0;
+  double most = 0;
+};
+OmittedLight omitted_irradiance(const LightStatistics& light, const LatlongSpectrum& spectrum,
+                                int bands);
 
 // The grid that a level is read from: interpolating it is part of the bound.
 int convolution_rings(int bands);

@@ -10,6 +10,7 @@
 #include "core/environment/ggx_lobe.h"
 #include "core/environment/near_field.h"
 #include "core/environment/prefilter.h"
+#include "core/sphere/harmonics.h"
 
 namespace lightkiln {
 
@@ -52,7 +53,7 @@ struct BandChoice {
 BandChoice choose_bands(const LightStatistics& light, const std::vector<double>& tails,
                         double target) {
   const int all = first_under(tails, 0.1 * target / light.spread);
-  const int rest = first_under(tails, 0.5 * target / light.rest_spread);
+  const int rest = first_under(tails, 0.15 * target / light.rest_spread);
   // Correction costs a term per texel and bright texel; a few more bands are cheaper.
   if (all > 0 && (light.bright.empty() || all <= rest + rest / 2 + 48)) {
     return {all, false};
@@ -105,11 +106,11 @@ LobePlan plan_split(const LightStatistics& light, const Lobe& lobe, double targe
 
 int convolution_rings(int bands) {
   constexpr double kRingsPerBand = 2.5;
-  return std::max(16, 2 * static_cast<int>(std::ceil(kRingsPerBand * bands / 2)));
+  return std::max(64, 2 * static_cast<int>(std::ceil(kRingsPerBand * bands / 2)));
 }
 int convolution_longitudes(int bands) {
   constexpr double kLongitudesPerBand = 5;
-  int result = 16;
+  int result = 64;
   while (result < kLongitudesPerBand * bands) result *= 2;
   return result;
 }
@@ -143,6 +144,46 @@ LobePlan plan_lobe(const LightStatistics& light, const Lobe& lobe, double target
   const LobePlan plan = plan_banded(light, lobe, target);
   if (lobe.kind == LobeKind::charlie || plan.bands <= kSplitBands) return plan;
   return plan_split(light, lobe, target);
+}
+
+LobePlan plan_irradiance_bands(const LightStatistics& light, int bands) {
+  LobePlan plan;
+  plan.lobe = {LobeKind::ggx, 1};
+  plan.bands = bands;
+  for (int l = 0; l < bands; ++l) plan.responses.push_back(clamped_cosine_band(l) / kPi);
+  plan.error_bound = plan.uncorrected_bound = interpolation_bound(light, plan.responses, bands);
+  plan.within_range = false;
+  return plan;
+}
+
+// Parseval: the rms is the root of sum_l h_l^2 E_l / (4 pi), E_l the energy of a band. At a point a
+// band of energy E_l is at most sqrt(E_l (2l+1) / (4 pi)). What the spectrum itself lacks has at
+// most the map's variance left, and by Cauchy's inequality at most sqrt(sum h_l^2 (2l+1)) of it at
+// a point; h_l falls as l^-2.5, so that the sum's rest is an integral.
+OmittedLight omitted_irradiance(const LightStatistics& light, const LatlongSpectrum& spectrum,
+                                int bands) {
+  const std::vector<Vec3d> energy = band_energy(spectrum);
+  OmittedLight omitted;
+  for (int c = 0; c < 3; ++c) {
+    double squares = 0, most = 0;
+    for (int l = bands; l < spectrum.bands; ++l) {
+      const double h = clamped_cosine_band(l) / kPi, e = energy[static_cast<size_t>(l)][c];
+      squares += h * h * e;
+      most += std::abs(h) * std::sqrt(e * (2 * l + 1) / (4 * kPi));
+    }
+    omitted.rms = std::max(omitted.rms, std::sqrt(squares / (4 * kPi)) / light.mean_luminance);
+    omitted.most = std::max(omitted.most, most / light.mean_luminance);
+  }
+  constexpr double kSummed = 2048;
+  double rest = 0, largest = 0;
+  for (int l = spectrum.bands; l < kSummed; ++l) {
+    const double h = clamped_cosine_band(l) / kPi;
+    rest += h * h * (2 * l + 1);
+    largest = std::max(largest, std::abs(h));
+  }
+  omitted.rms = std::hypot(omitted.rms, largest * light.spread);
+  omitted.most += light.spread * std::sqrt(rest + 1 / (kSummed * kSummed * kSummed));
+  return omitted;
 }
 
 }  // namespace lightkiln

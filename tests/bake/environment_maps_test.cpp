@@ -26,9 +26,9 @@ Spec order(const EnvironmentMapsParameters& parameters) {
 EnvironmentMapsParameters everything() {
   EnvironmentMapsParameters parameters;
   parameters.sh = ShOutput{5};
-  parameters.irradiance = IrradianceOutput{8};
-  parameters.prefilter = PrefilterOutput{32, 4};
-  parameters.dfg = DfgOutput{16};
+  parameters.irradiance = IrradianceOutput{.size = 8};
+  parameters.prefilter = PrefilterOutput{.size = 32, .levels = 4};
+  parameters.dfg = DfgOutput{.size = 16};
   return parameters;
 }
 
@@ -227,7 +227,7 @@ TEST(MapsOutput, IsSuspiciousWhenWhatIsSeenBreaksWhatWasPromised) {
 
 TEST(EnvironmentMaps, SaysWhenAnOrderCannotBeReached) {
   EnvironmentMapsParameters parameters;
-  parameters.irradiance = IrradianceOutput{2};
+  parameters.irradiance = IrradianceOutput{.size = 2};
   Spec spec = order(parameters);
   spec.accuracy.target_error = 1e-9;
   const Assembly result = bake(spec, exr_of(reference::test_sky(16, 1e4)));

@@ -115,7 +115,7 @@ TEST(Spec, EnvironmentMapsAreHeldToTheirRanges) {
   auto& p = std::get<EnvironmentMapsParameters>(spec.parameters);
   p.sh->bands = 130;
   p.irradiance->size = 0;
-  p.prefilter = PrefilterOutput{100, 1};
+  p.prefilter = PrefilterOutput{.size = 100, .levels = 1};
   p.dfg->size = 7;
   const auto all = faults(spec);
   EXPECT_EQ(all.size(), 5u);
@@ -125,10 +125,41 @@ TEST(Spec, EnvironmentMapsAreHeldToTheirRanges) {
     EXPECT_TRUE(has(all, one)) << one;
   p = {};
   EXPECT_TRUE(has(faults(spec), "/parameters missing"));
-  p.prefilter = PrefilterOutput{8, 5};
+  p.prefilter = PrefilterOutput{.size = 8, .levels = 5};
   EXPECT_TRUE(has(faults(spec), "/parameters/prefilter/levels conflict"));
-  p.prefilter = PrefilterOutput{8, 4};
+  p.prefilter = PrefilterOutput{.size = 8, .levels = 4};
   EXPECT_TRUE(faults(spec).empty());
+}
+
+TEST(Spec, ChainsNameARoughnessForEachLevelExactlyWhenCustom) {
+  Spec spec = maps();
+  auto& p = std::get<EnvironmentMapsParameters>(spec.parameters);
+  p = {};
+  p.sheen = PrefilterOutput{.levels = 2, .roughness = {0.5, 1}};
+  EXPECT_TRUE(has(faults(spec), "/parameters/sheen/roughness conflict"));
+  p.sheen->roughness_scale = RoughnessScale::custom;
+  EXPECT_TRUE(faults(spec).empty());
+  p.sheen->roughness = {0.05, 1};  // under what sheen can draw
+  EXPECT_TRUE(has(faults(spec), "/parameters/sheen/roughness/0 range"));
+  p.prefilter = p.sheen;
+  p.sheen.reset();
+  EXPECT_TRUE(faults(spec).empty());
+  p.prefilter->roughness = {0, 0.5, 1.5};
+  EXPECT_TRUE(has(faults(spec), "/parameters/prefilter/roughness conflict"));
+  EXPECT_TRUE(has(faults(spec), "/parameters/prefilter/roughness/2 range"));
+  p.prefilter->roughness.clear();
+  EXPECT_TRUE(has(faults(spec), "/parameters/prefilter/roughness missing"));
+}
+
+TEST(Spec, BandsBelongToHarmonicIrradiance) {
+  Spec spec = maps();
+  auto& p = std::get<EnvironmentMapsParameters>(spec.parameters);
+  p.irradiance = IrradianceOutput{.bands = 5};
+  EXPECT_TRUE(has(faults(spec), "/parameters/irradiance/bands conflict"));
+  p.irradiance->method = IrradianceMethod::harmonics;
+  EXPECT_TRUE(faults(spec).empty());
+  p.irradiance->bands = 34;
+  EXPECT_TRUE(has(faults(spec), "/parameters/irradiance/bands range"));
 }
 
 TEST(Spec, EnvironmentMapsRefuseWhatOnlySamplingCouldUse) {
