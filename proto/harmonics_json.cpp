@@ -1,5 +1,7 @@
 #include "proto/harmonics_json.h"
 
+#include <span>
+
 #include "proto/json.h"
 
 namespace lightkiln {
@@ -85,7 +87,8 @@ void write_spectrum(JsonWriter& writer, const SpectrumDocument& document) {
   writer.key("recommendations").begin_array();
   for (const BandAdvice& advice : document.quoted) write_advice(writer, advice);
   writer.end_array().key("rows").begin_array();
-  for (const BandRow& row : document.spectrum.rows)
+  const std::span rows(document.spectrum.rows);
+  for (const BandRow& row : rows.first(static_cast<size_t>(document.rows)))
     writer.begin_object()
         .member("bands", row.bands)
         .member("energy", row.energy)

@@ -270,7 +270,8 @@ KindTable environment_maps_table() {
   groups.push_back(
       {"/parameters/spectrum",
        {{"bands", +[](Spec& s) -> int& { return parameters<Maps>(s).spectrum->bands; }, kMapBands,
-         false, "Rows of the spectrum. Cost grows as with as many bands of coefficients."}},
+         false,
+         "Rows of the table. Advice reaches to 129 bands, whatever is listed; all cost the same."}},
        [](const Spec& s) { return parameters<Maps>(s).spectrum.has_value(); },
        [](Spec& s) { parameters<Maps>(s).spectrum.emplace(); }});
   groups.push_back(

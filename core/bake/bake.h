@@ -107,7 +107,8 @@ struct DfgDocument : MapDocument {
   bool charlie = false;
 };
 struct SpectrumDocument {
-  ShSpectrum spectrum;
+  ShSpectrum spectrum;             // of as many bands as can be ordered
+  int rows = 0;                    // of them, those that were asked for
   BandAdvice ordered;              // for the error that was ordered
   std::vector<BandAdvice> quoted;  // for the errors that every plan prices
   double error_bound = 0;          // of a coefficient, relative to L00

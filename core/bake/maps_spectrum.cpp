@@ -10,13 +10,19 @@ namespace lightkiln {
 
 namespace {
 
+// The most bands that an order of coefficients can have: advice goes so far, whatever is listed.
+constexpr int kAdvisedBands = 129;
+// Bands that are measured. What lies beyond is bounded by its rms times the cosine's factor there,
+// 1.5e-6: under a clear sky's sun, with an rms of 200 means, 3e-4 of the mean irradiance.
+constexpr int kMeasuredBands = 257;
+
 class Spectrum : public MapsOutput {
  public:
   Spectrum(int bands, bool constant, double ordered)
       : bands_(bands), constant_(constant), ordered_(ordered) {}
 
   double error_bound() const override { return constant_ ? 0 : kShErrorBound; }
-  SpectrumNeed spectrum_need() const override { return {constant_ ? 0 : bands_, nullptr}; }
+  SpectrumNeed spectrum_need() const override { return {constant_ ? 0 : kMeasuredBands, nullptr}; }
   double model_seconds(MapsLight& light) const override {
     const Image& map = light.environment().radiance;
     return constant_ ? 0 : kEnergyPerTexel * map.width * map.height;
@@ -28,7 +34,7 @@ class Spectrum : public MapsOutput {
     const Environment& environment = light.environment();
     const Vec3d whole = constant_ ? environment.mean * environment.mean * (4 * kPi)
                                   : latlong_energy(environment.radiance, light.threads(), progress);
-    std::vector<Vec3d> energy(static_cast<size_t>(bands_));
+    std::vector<Vec3d> energy(kMeasuredBands);
     if (constant_) {
       energy[0] = whole;
     } else {
@@ -43,10 +49,11 @@ class Spectrum : public MapsOutput {
   void file(ByteReader& reader, const MeasuredError& measured, Assembly*,
             EnvironmentDocument* document) const override {
     const Vec3d mean = read(reader), whole = read(reader);
-    std::vector<Vec3d> energy(static_cast<size_t>(bands_));
+    std::vector<Vec3d> energy(kMeasuredBands);
     for (Vec3d& v : energy) v = read(reader);
     SpectrumDocument spectrum;
-    spectrum.spectrum = make_spectrum(energy, whole, mean);
+    spectrum.spectrum = make_spectrum(energy, whole, mean, kAdvisedBands);
+    spectrum.rows = bands_;
     spectrum.ordered = advise_bands(spectrum.spectrum, ordered_);
     for (const double error : kQuotedErrors) {
       spectrum.quoted.push_back(advise_bands(spectrum.spectrum, error));

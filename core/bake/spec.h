@@ -54,7 +54,7 @@ struct ShOutput {
 };
 // Energy by band, what is missing after n bands, and how many bands are enough.
 struct SpectrumOutput {
-  int bands = 33;  // 1..129 rows; cost as of as many bands of SH
+  int bands = 33;  // 1..129 rows of the table; all cost the same, that of 257 bands of SH
 };
 enum class IrradianceMethod {
   exact,      // the whole map under the clamped cosine

@@ -4,6 +4,7 @@
 #include "core/sphere/harmonic_spectrum.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "core/base/parallel.h"
@@ -58,7 +59,9 @@ double lobe_tail(int first) {
 // A_l on band l, and |A_l| falls with even l (odd bands above 1 vanish). At one direction band l is
 // off by at most A_l sqrt((2l+1) / 4 pi) |c_l| (addition theorem), and everything beyond the known
 // bands by sqrt(lobe_tail) times the length of the unknown coefficients (Cauchy and Schwarz).
-ShSpectrum make_spectrum(std::span<const Vec3d> energy, const Vec3d& total, const Vec3d& mean) {
+ShSpectrum make_spectrum(std::span<const Vec3d> energy, const Vec3d& total, const Vec3d& mean,
+                         int rows) {
+  assert(rows >= 1 && static_cast<size_t>(rows) <= energy.size());
   ShSpectrum spectrum;
   spectrum.total_energy = total;
   spectrum.mean = mean;
@@ -68,21 +71,23 @@ ShSpectrum make_spectrum(std::span<const Vec3d> energy, const Vec3d& total, cons
   const Vec3d beyond = positive(total - sum);
   const double beyond_factor =
       std::max(std::abs(clamped_cosine_band(known)), std::abs(clamped_cosine_band(known + 1)));
-  // From the last row to the first, so that small bands are added first.
+  // From the last band to the first, so that small energies are added first.
   Vec3d radiance = beyond, irradiance = beyond * (beyond_factor * beyond_factor);
   Vec3d peak{std::sqrt(beyond.x), std::sqrt(beyond.y), std::sqrt(beyond.z)};
   peak *= std::sqrt(lobe_tail(known));
   const double scale = luminance(mean);
-  spectrum.rows.resize(energy.size());
+  spectrum.rows.resize(static_cast<size_t>(rows));
   for (int l = known - 1; l >= 0; --l) {
-    BandRow& row = spectrum.rows[static_cast<size_t>(l)];
     const Vec3d& band = energy[static_cast<size_t>(l)];
-    row.bands = l + 1;
-    row.energy = band;
-    if (scale > 0) {
-      row.radiance_rms = std::sqrt(largest(radiance) / (4 * kPi)) / scale;
-      row.irradiance_rms = std::sqrt(largest(irradiance) / (4 * kPi)) / (kPi * scale);
-      row.irradiance_max = largest(peak) / (kPi * scale);
+    if (l < rows) {
+      BandRow& row = spectrum.rows[static_cast<size_t>(l)];
+      row.bands = l + 1;
+      row.energy = band;
+      if (scale > 0) {
+        row.radiance_rms = std::sqrt(largest(radiance) / (4 * kPi)) / scale;
+        row.irradiance_rms = std::sqrt(largest(irradiance) / (4 * kPi)) / (kPi * scale);
+        row.irradiance_max = largest(peak) / (kPi * scale);
+      }
     }
     const double a = std::abs(clamped_cosine_band(l));
     radiance += band;

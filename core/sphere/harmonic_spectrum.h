@@ -29,13 +29,15 @@ struct BandRow {
 struct ShSpectrum {
   Vec3d total_energy;         // of all bands
   Vec3d mean;                 // radiance
-  std::vector<BandRow> rows;  // n = 1 .. bands
+  std::vector<BandRow> rows;  // n = 1, 2, ...
 };
 
-// `energy` holds sum_m c_lm^2 of each known band, `total` that of all bands, `mean` the mean
-// radiance. What lies beyond the known bands counts in full for radiance, and for irradiance by the
-// largest cosine factor there. A black map has zero errors.
-ShSpectrum make_spectrum(std::span<const Vec3d> energy, const Vec3d& total, const Vec3d& mean);
+// Of `rows` bands. `energy` holds sum_m c_lm^2 of at least as many bands, `total` that of all
+// bands, `mean` the mean radiance. What lies beyond the known bands counts in full for radiance,
+// and for irradiance by the largest cosine factor there: under a small sun irradiance is told well
+// only when many more bands are known than rows are wanted. A black map has zero errors.
+ShSpectrum make_spectrum(std::span<const Vec3d> energy, const Vec3d& total, const Vec3d& mean,
+                         int rows);
 
 // The fewest bands whose rms error is at most `error`; 0 when more than the spectrum's rows are
 // needed.

@@ -159,7 +159,8 @@ TEST(DocumentJson, TellsWindowZh3AndSpectrum) {
   document.sh_exports.push_back(export_sh(sky(), ShTarget::unity));
   SpectrumDocument spectrum;
   const std::vector<Vec3d> energy = {{4, 4, 4}, {1, 1, 1}};
-  spectrum.spectrum = make_spectrum(energy, {6, 6, 6}, {1, 1, 1});
+  spectrum.spectrum = make_spectrum(energy, {6, 6, 6}, {1, 1, 1}, 2);
+  spectrum.rows = 2;
   spectrum.ordered = advise_bands(spectrum.spectrum, 0.01);
   spectrum.quoted = {advise_bands(spectrum.spectrum, 0.9)};
   document.spectrum = spectrum;
