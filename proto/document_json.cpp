@@ -172,6 +172,69 @@ void write_chain(JsonWriter& writer, const char* name, const std::vector<MapDocu
   writer.end_array();
 }
 
+void write_coefficients(JsonWriter& writer, const ShRgb& sh) {
+  writer.begin_object().member("bands", sh.bands).key("coefficients").begin_array();
+  for (const Vec3d& coefficient : sh.coefficients) writer.value(coefficient);
+  writer.end_array().end_object();
+}
+
+void write_sun(JsonWriter& writer, const EnvironmentDocument& document) {
+  const SunExtraction& sun = *document.sun;
+  writer.begin_object()
+      .member("found", sun.found)
+      .member("reason", sun.reason)
+      .member("energy_before", sun.energy_before)
+      .member("energy_after", sun.energy_after)
+      .key("disk");
+  if (!sun.found) {
+    writer.null().end_object();
+    return;
+  }
+  const double degrees = 180 / kPi;
+  writer.begin_object()
+      .member("artifact", document.sun_artifact)
+      .member("direction", sun.disk.direction)
+      .member("angular_radius_degrees", sun.disk.angular_radius_rad * degrees)
+      .member("radiance", sun.disk.radiance)
+      .member("energy", sun.disk.energy())
+      .member("irradiance", sun.disk.irradiance())
+      .member("contrast", sun.contrast)
+      .member("texels", sun.texels)
+      .member("extent_degrees", sun.extent_rad * degrees)
+      .key("sh");
+  write_coefficients(writer, document.sun_sh);
+  write_measured(writer, document.sun_measured);
+  writer.end_object().end_object();
+}
+
+void write_light_set_error(JsonWriter& writer, const LightSetError& error) {
+  writer.begin_object()
+      .member("lights", error.lights)
+      .member("rms", error.rms)
+      .member("max", error.max)
+      .end_object();
+}
+
+void write_light_set(JsonWriter& writer, const LightSetDocument& set) {
+  writer.begin_object()
+      .member("artifact", set.artifact)
+      .member("units",
+              "irradiance of a facing surface: radiance of the input times steradians; lux in the "
+              "glTF where a radiance of 1 is 1 cd/m^2, and then intensity times color")
+      .member("energy", set.energy)
+      .key("irradiance_error");
+  write_light_set_error(writer, set.error);
+  writer.key("irradiance_error_by_lights").begin_array();
+  for (const LightSetError& row : set.by_lights) write_light_set_error(writer, row);
+  writer.end_array().key("lights").begin_array();
+  for (const DirectionalLight& light : set.lights)
+    writer.begin_object()
+        .member("direction", light.direction)
+        .member("irradiance", light.irradiance)
+        .end_object();
+  writer.end_array().end_object();
+}
+
 void write_environment(JsonWriter& writer, const EnvironmentDocument& document) {
   write_radiance_convention(writer);
   writer.key("source")
@@ -218,6 +281,16 @@ void write_environment(JsonWriter& writer, const EnvironmentDocument& document) 
     writer.null();
   writer.key("layouts");
   write_layouts(writer, document.layouts);
+  writer.key("sun");
+  if (document.sun)
+    write_sun(writer, document);
+  else
+    writer.null();
+  writer.key("light_set");
+  if (document.light_set)
+    write_light_set(writer, *document.light_set);
+  else
+    writer.null();
 }
 
 void write_probes(JsonWriter& writer, const ProbesDocument& document) {

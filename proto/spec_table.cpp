@@ -256,6 +256,35 @@ ParameterGroup dfg_group() {
           [](Spec& s) { parameters<Maps>(s).dfg.emplace(); }};
 }
 
+ParameterGroup sun_group() {
+  return {"/parameters/sun",
+          {{"max_angular_radius_degrees",
+            +[](Spec& s) -> double& { return parameters<Maps>(s).sun->max_angular_radius_degrees; },
+            {0, 10, true},
+            false,
+            "How far the source may reach from its centre. A wider one stays in the map."},
+           {"min_contrast",
+            +[](Spec& s) -> double& { return parameters<Maps>(s).sun->min_contrast; },
+            {1, 1000},
+            false,
+            "How many times as bright as the level at which it stands off its surroundings the "
+            "source's brightest texel must be."}},
+          [](const Spec& s) { return parameters<Maps>(s).sun.has_value(); },
+          [](Spec& s) { parameters<Maps>(s).sun.emplace(); }};
+}
+
+ParameterGroup light_set_group() {
+  return {"/parameters/light_set",
+          {{"lights",
+            +[](Spec& s) -> std::optional<int>& { return parameters<Maps>(s).light_set->lights; },
+            {1, 256},
+            false,
+            "Directional lights. null = the fewest of 1, 2, 4, .. 256 whose irradiance has an rms "
+            "error of at most target_error; 256 if none has."}},
+          [](const Spec& s) { return parameters<Maps>(s).light_set.has_value(); },
+          [](Spec& s) { parameters<Maps>(s).light_set.emplace(); }};
+}
+
 KindTable environment_maps_table() {
   std::vector<ParameterGroup> groups = {without(root_group(), {"seed"}),
                                         without(accuracy_group(), {"max_samples", "max_seconds"}),
@@ -267,6 +296,8 @@ KindTable environment_maps_table() {
   groups.push_back(chain_group<&Maps::prefilter>("/parameters/prefilter", 0));
   groups.push_back(chain_group<&Maps::sheen>("/parameters/sheen", kMinSheenRoughness));
   groups.push_back(dfg_group());
+  groups.push_back(sun_group());
+  groups.push_back(light_set_group());
   groups.push_back(
       {"/parameters/spectrum",
        {{"bands", +[](Spec& s) -> int& { return parameters<Maps>(s).spectrum->bands; }, kMapBands,

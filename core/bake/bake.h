@@ -22,7 +22,9 @@
 
 #include "core/bake/plan.h"
 #include "core/base/progress.h"
+#include "core/environment/light_set.h"
 #include "core/environment/round_trip.h"
+#include "core/environment/sun_extraction.h"
 #include "core/image/image.h"
 #include "core/sphere/harmonic_spectrum.h"
 #include "core/sphere/harmonics.h"
@@ -137,6 +139,20 @@ struct LayoutDocument {
   double error_bound = 0;               // rms of a texel's mean; 0 where texels are only moved
   std::optional<RoundTrip> round_trip;  // none when nothing was to be checked
 };
+// The irradiance that `lights` directional lights give, against the map's at 1024 normals: relative
+// to the mean irradiance.
+struct LightSetError {
+  int lights = 0;
+  double rms = 0, max = 0;
+};
+struct LightSetDocument {
+  std::string artifact;
+  std::vector<DirectionalLight> lights;  // brightest first
+  Vec3d energy;                          // the sum of their irradiances
+  LightSetError error;
+  std::vector<LightSetError> by_lights;  // 1, 2, 4, .. 256
+};
+
 struct EnvironmentDocument {
   MapLayout source_layout;          // of the file
   double source_covered_share = 1;  // of the sphere; the rest was taken as black
@@ -157,6 +173,11 @@ struct EnvironmentDocument {
   std::vector<MapDocument> prefilter, sheen;  // levels as ordered
   std::optional<DfgDocument> dfg;
   std::optional<AssetDocument> asset;
+  std::optional<SunExtraction> sun;  // found or not, when it was ordered
+  std::string sun_artifact;          // "" = none was found
+  ShRgb sun_sh;                      // of the disk
+  MeasuredError sun_measured;        // of energy, relative to the map's
+  std::optional<LightSetDocument> light_set;
 };
 
 enum class ProbeStatus { valid, inside_geometry, on_surface };

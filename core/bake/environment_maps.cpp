@@ -42,19 +42,29 @@ int bands_of(const MapsOutputs& outputs) {
 
 }  // namespace
 
+namespace {
+
+std::optional<SunOptions> sun_options(const Spec& spec) {
+  const auto& sun = std::get<EnvironmentMapsParameters>(spec.parameters).sun;
+  if (!sun) return {};
+  return SunOptions{sun->max_angular_radius_degrees * kPi / 180, sun->min_contrast};
+}
+
+}  // namespace
+
 std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_maps_open(
     const Spec& spec, const Inputs& inputs, const Grants& grants) {
   const auto& parameters = std::get<EnvironmentMapsParameters>(spec.parameters);
   DecodedImage decoded = decode_light_image(blob_bytes(spec.environment.value(), inputs));
-  std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> state(
-      new EnvironmentMapsState{spec,
-                               grants,
-                               decoded.format,
-                               light_warnings(decoded),
-                               {make_environment(std::move(decoded), reading_of(parameters.source),
-                                                 rotation_of(parameters.rotation), grants.threads),
-                                grants.threads},
-                               {}});
+  std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> state(new EnvironmentMapsState{
+      spec,
+      grants,
+      decoded.format,
+      light_warnings(decoded),
+      MapsLight(make_environment(std::move(decoded), reading_of(parameters.source),
+                                 rotation_of(parameters.rotation), grants.threads),
+                grants.threads, sun_options(spec)),
+      {}});
   state->outputs =
       order_outputs(state->parameters(), state->light, working_target(state->target()));
   require_spectrum(state->outputs, &state->light);
@@ -158,10 +168,12 @@ std::vector<Effect> list_effects(EnvironmentMapsState& state) {
                                  coverage_effect(state),   rotation_effect(state),
                                  harmonics_effect(state)};
   for (const MapsProduct& product : maps_products()) {
-    if (product.ordered(state.parameters()))
-      effects.push_back({product.name, true, product.reason, 1});
-    else
+    if (!product.ordered(state.parameters()))
       effects.push_back({product.name, false, "Not ordered.", 0});
+    else if (product.effect)
+      effects.push_back(product.effect(state.light));
+    else
+      effects.push_back({product.name, true, product.reason, 1});
   }
   return effects;
 }
@@ -214,6 +226,10 @@ Plan environment_maps_plan(EnvironmentMapsState& state, Progress& progress) {
   if (environment.covered_share < 1 - 1e-12) {
     plan.warnings.push_back("The file shows " + short_number(100 * environment.covered_share) +
                             " % of the sphere; the rest is black.");
+  }
+  const std::optional<SunExtraction>& sun = state.light.sun();
+  if (sun && !sun->found) {
+    plan.warnings.push_back("No sun was taken out of the map. " + sun->reason);
   }
   if (!(luminance(environment.mean) > 0)) {
     plan.warnings.push_back("The environment is black: every light output is 0.");
@@ -299,7 +315,10 @@ ChunkResult environment_maps_chunk(EnvironmentMapsState& state, const Plan& plan
     const MeasuredError measured =
         output.make(state.light, state.spec.accuracy.check_texels, writer, share.part);
     all_measured.push_back(measured);
-    judge_output(output.error_bound(), measured, state.target(), &result.report, &round);
+    if (output.bounded())
+      judge_output(output.error_bound(), measured, state.target(), &result.report, &round);
+    else
+      judge_output(measured.rms, {}, state.target(), &result.report, &round);
   }
   for (const MeasuredError& measured : all_measured) write_measured(measured, writer);
   result.bytes = writer.take();
@@ -348,8 +367,9 @@ Assembly environment_maps_assemble(EnvironmentMapsState& state, const Plan& plan
   document.rotation = environment.rotation;
   document.source_format = state.format;
   document.repairs = environment.repairs;
-  document.mean = environment.mean;
-  document.max_luminance = environment.max_luminance;
+  const std::optional<SunExtraction>& sun = state.light.sun();
+  document.mean = sun ? sun->energy_before / (4 * kPi) : environment.mean;
+  document.max_luminance = sun ? sun->max_luminance_before : environment.max_luminance;
   for (size_t c = 0; c < chunks.size(); ++c) {
     const ElementRange& range = plan.chunks[c];
     const std::span<const std::byte> bytes = chunks[c].bytes;

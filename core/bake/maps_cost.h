@@ -19,8 +19,11 @@ inline constexpr double kConvertPerTexel = 1.5e-6;  // of another layout
 inline constexpr double kLookUpPerTexel = 2.5e-7;   // of the source, for the round trip
 inline constexpr double kPerDfgValue = 2.8e-6;
 inline constexpr double kPerCharlieValue = 2.3e-6;
-inline constexpr double kRgbdPerTexel = 4e-7;   // packing and writing PNG
-inline constexpr double kBrutePerTexel = 5e-9;  // of the map, each texel that is checked
+inline constexpr double kRgbdPerTexel = 4e-7;  // packing and writing PNG
+inline constexpr double kSunPerTexel = 6e-9;
+inline constexpr double kLightSetPerTexel = 8e-9;  // into cells
+inline constexpr double kLightSetSeconds = 0.3;    // nine sets of 1 to 256 lights and their errors
+inline constexpr double kBrutePerTexel = 5e-9;     // of the map, each texel that is checked
 
 inline constexpr double kEnergyPerTexel = 2e-9;
 // Windows look for extremes on grids of 32 points a band squared; `minimal` does so about 20 times.

@@ -4,8 +4,10 @@
 
 namespace lightkiln {
 
-MapsLight::MapsLight(Environment environment, int threads)
-    : environment_(std::move(environment)), threads_(threads) {}
+MapsLight::MapsLight(Environment environment, int threads, const std::optional<SunOptions>& sun)
+    : environment_(std::move(environment)), threads_(threads) {
+  if (sun) sun_ = extract_sun(environment_, *sun);
+}
 
 const LightStatistics& MapsLight::statistics() {
   if (!statistics_) statistics_ = measure_light(environment_);

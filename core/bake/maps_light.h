@@ -7,14 +7,20 @@
 #include <span>
 
 #include "core/environment/prefilter.h"
+#include "core/environment/sun_extraction.h"
 
 namespace lightkiln {
 
 class MapsLight {
  public:
-  MapsLight(Environment environment, int threads);
+  // With `sun` the source that it describes is taken out of the map first.
+  explicit MapsLight(Environment environment, int threads,
+                     const std::optional<SunOptions>& sun = {});
 
+  // What outputs are made of: the map without a sun that was taken out.
   const Environment& environment() const { return environment_; }
+  // None when it was not ordered.
+  const std::optional<SunExtraction>& sun() const { return sun_; }
   // Every texel is equal: no output needs statistics or coefficients.
   bool constant() const { return environment_.constant; }
   int threads() const { return threads_; }
@@ -31,6 +37,7 @@ class MapsLight {
 
  private:
   Environment environment_;
+  std::optional<SunExtraction> sun_;
   int threads_;
   std::optional<LightStatistics> statistics_;
   int sh_bands_ = 0;

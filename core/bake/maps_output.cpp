@@ -8,9 +8,9 @@
 namespace lightkiln {
 
 std::span<const MapsProduct> maps_products() {
-  static const MapsProduct products[] = {kShProduct,    kIrradianceProduct, kPrefilterProduct,
-                                         kSheenProduct, kDfgProduct,        kSpectrumProduct,
-                                         kAssetProduct, kLayoutsProduct};
+  static const MapsProduct products[] = {
+      kSunProduct, kShProduct,       kIrradianceProduct, kPrefilterProduct, kSheenProduct,
+      kDfgProduct, kSpectrumProduct, kAssetProduct,      kLayoutsProduct,   kLightSetProduct};
   return products;
 }
 

@@ -25,6 +25,9 @@ class MapsOutput {
 
   // Stated before the work starts, in the unit of target_error: relative rms over the sphere.
   virtual double error_bound() const = 0;
+  // False: nothing can be promised before the work, error_bound() is 0, and what make() measures
+  // stands in its place.
+  virtual bool bounded() const { return true; }
   virtual SpectrumNeed spectrum_need() const { return {}; }
   // CPU seconds on the model's core (maps_cost.h) beside those of the shared coefficients.
   virtual double model_seconds(MapsLight& light) const = 0;
@@ -50,6 +53,8 @@ struct MapsProduct {
   // Appends its outputs, made to an error of `target` (a bound, see working_target()).
   void (*order)(const EnvironmentMapsParameters& parameters, MapsLight& light, double target,
                 MapsOutputs* outputs);
+  // What the plan says instead of `reason` when the product is ordered; null = nothing else.
+  Effect (*effect)(const MapsLight& light) = nullptr;
 };
 
 // In the order of elements.
@@ -98,6 +103,7 @@ Artifact cube_artifact(const std::string& name, const Image& cube,
 Artifact mip_mapped_cube_artifact(const std::string& name, std::span<const Image> levels,
                                   std::map<std::string, std::string> attributes);
 
+extern const MapsProduct kSunProduct;
 extern const MapsProduct kShProduct;
 extern const MapsProduct kIrradianceProduct;
 extern const MapsProduct kPrefilterProduct;
@@ -106,5 +112,6 @@ extern const MapsProduct kDfgProduct;
 extern const MapsProduct kSpectrumProduct;
 extern const MapsProduct kAssetProduct;
 extern const MapsProduct kLayoutsProduct;
+extern const MapsProduct kLightSetProduct;
 
 }  // namespace lightkiln

@@ -261,17 +261,29 @@ void check_chain(const PrefilterOutput& chain, double least_roughness, const std
   check_roughness(chain, least_roughness, pointer + "/roughness", checker);
 }
 
+void check_sun(const SunOrder& sun, Checker& checker) {
+  if (!(sun.max_angular_radius_degrees > 0 && sun.max_angular_radius_degrees <= 10))
+    checker.fault("/parameters/sun/max_angular_radius_degrees", "range",
+                  "max_angular_radius_degrees must be above 0 and at most 10.");
+  if (!(sun.min_contrast >= 1 && sun.min_contrast <= 1000))
+    checker.fault("/parameters/sun/min_contrast", "range", "min_contrast must be 1 to 1000.");
+}
+
 void check_environment_maps(const EnvironmentMapsParameters& p, Checker& checker) {
-  if (!p.sh && !p.irradiance && !p.prefilter && !p.sheen && !p.dfg && !p.spectrum && !p.asset &&
-      !any_layout(p.layouts))
-    checker.fault("/parameters", "missing",
-                  "Order at least one of sh, irradiance, prefilter, sheen, dfg, spectrum, asset "
-                  "and layouts.");
+  if (!p.sun && !p.sh && !p.irradiance && !p.prefilter && !p.sheen && !p.dfg && !p.spectrum &&
+      !p.asset && !any_layout(p.layouts) && !p.light_set)
+    checker.fault(
+        "/parameters", "missing",
+        "Order at least one of sun, sh, irradiance, prefilter, sheen, dfg, spectrum, asset, "
+        "layouts and light_set.");
   check_source(p.source, checker);
   check_rotation(p.rotation, checker);
   check_layouts(p.layouts, checker);
   if (p.sh) check_sh(*p.sh, checker);
   if (p.spectrum) checker.between(p.spectrum->bands, 1, 129, "/parameters/spectrum/bands", "bands");
+  if (p.sun) check_sun(*p.sun, checker);
+  if (p.light_set && p.light_set->lights)
+    checker.between(*p.light_set->lights, 1, 256, "/parameters/light_set/lights", "lights");
   if (p.irradiance) check_irradiance(*p.irradiance, checker);
   if (p.dfg) checker.between(p.dfg->size, 8, 1024, "/parameters/dfg/size", "size");
   if (p.prefilter) check_chain(*p.prefilter, 0, "/parameters/prefilter", checker);

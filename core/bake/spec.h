@@ -98,6 +98,19 @@ struct AssetOutput {
   int size = 256;
   AssetRoughness roughness = AssetRoughness::linear;
 };
+// Takes the brightest compact source out of the map, so that every other output is of the rest.
+struct SunOrder {
+  // How far the source may reach from its centre: above 0 to 10. A wider one stays in the map.
+  double max_angular_radius_degrees = 2.5;
+  // How many times as bright as the level at which it stands off its surroundings: 1..1000.
+  double min_contrast = 5;
+};
+// Directional lights that stand for the map.
+struct LightSetOutput {
+  // 1..256. None = the fewest of 1, 2, 4, .. 256 whose irradiance has an rms error of at most
+  // target_error; 256 if none has.
+  std::optional<int> lights;
+};
 
 struct EnvironmentMapsParameters {
   SourceParameters source;
@@ -110,7 +123,9 @@ struct EnvironmentMapsParameters {
   std::optional<SpectrumOutput> spectrum;
   std::optional<AssetOutput> asset;
   LayoutOrders layouts;  // by product, see layout_orders.h
-  // At least one of them is ordered.
+  std::optional<LightSetOutput> light_set;
+  std::optional<SunOrder> sun;
+  // At least one of these is ordered.
 };
 
 struct CubemapOutput {

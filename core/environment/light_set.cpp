@@ -11,7 +11,6 @@ namespace lightkiln {
 
 namespace {
 
-constexpr int kNormals = 1024;
 constexpr int kLloydRounds = 24;
 
 // Weight and first moment of a set of cells. The variance of direction in it, int w |d - mean|^2,

@@ -40,9 +40,10 @@ struct IrradianceError {
   double rms = 0, max = 0;
 };
 
-// Compares light sets with the map at 1024 normals spread over the sphere.
+// Compares light sets with the map at kNormals normals spread over the sphere.
 class IrradianceReference {
  public:
+  static constexpr int kNormals = 1024;
   IrradianceReference(const LightCells& light, int threads, Progress& progress);
   IrradianceError error(std::span<const DirectionalLight> lights) const;
 

@@ -208,6 +208,7 @@ Vec3d SunDisk::irradiance() const {
 SunExtraction extract_sun(Environment& environment, const SunOptions& options) {
   SunExtraction nothing;
   nothing.energy_before = nothing.energy_after = environment.mean * (4 * kPi);
+  nothing.max_luminance_before = environment.max_luminance;
   if (environment.constant) {
     nothing.reason = "The map has one radiance everywhere.";
     return nothing;
@@ -223,6 +224,7 @@ SunExtraction extract_sun(Environment& environment, const SunOptions& options) {
     if (candidate.sun.found) {
       take_out(grid, source, candidate, &environment);
       candidate.sun.energy_before = nothing.energy_before;
+      candidate.sun.max_luminance_before = nothing.max_luminance_before;
       candidate.sun.energy_after = environment.mean * (4 * kPi);
       return candidate.sun;
     }

@@ -37,6 +37,7 @@ struct SunExtraction {
   SunDisk disk;
   // Integrals of radiance over the sphere, of the map as it was and of what is left of it.
   Vec3d energy_before, energy_after;
+  double max_luminance_before = 0;
   double contrast = 0;    // brightest texel over the luminance at which the source was cut off
   double extent_rad = 0;  // from the disk's centre to the farthest texel that gave
   uint64_t texels = 0;    // that gave
