@@ -89,7 +89,7 @@ class LightSet : public MapsOutput {
       for (int c = 0; c < 3; ++c) light.direction[c] = reader.f64();
       for (int c = 0; c < 3; ++c) light.irradiance[c] = reader.f64();
       set.energy += light.irradiance;
-      written.push_back({light.direction, light.irradiance});
+      written.push_back({"light " + std::to_string(i), light.direction, light.irradiance});
       set.lights.push_back(light);
     }
     assembly->artifacts.push_back(

@@ -40,7 +40,7 @@ class Sun : public MapsOutput {
     if (!sun_.found) return;
     document->sun_sh = sun_harmonics(sun_.disk, bands_);
     document->sun_artifact = "sun.gltf";
-    const GltfDirectionalLight light{sun_.disk.direction, sun_.disk.irradiance()};
+    const GltfDirectionalLight light{"sun", sun_.disk.direction, sun_.disk.irradiance()};
     assembly->artifacts.push_back(
         {document->sun_artifact, "lights", "model/gltf+json",
          write_gltf_lights({&light, 1}, std::string("Lightkiln ") + kEngineVersion)});

@@ -24,11 +24,11 @@ JsonValue rotation_towards(const Vec3d& d) {
                     json_number(std::cos(half))}};
 }
 
-JsonValue light_json(const GltfDirectionalLight& light, const std::string& name) {
+JsonValue light_json(const GltfDirectionalLight& light) {
   const Vec3d& e = light.irradiance;
   const double intensity = std::max({e.x, e.y, e.z});
   JsonValue json{JsonObject{}};
-  json.set("name", json_string(name));
+  json.set("name", json_string(light.name));
   json.set("type", json_string("directional"));
   json.set("color", {JsonArray{json_number(e.x / intensity), json_number(e.y / intensity),
                                json_number(e.z / intensity)}});
@@ -42,12 +42,11 @@ std::vector<std::byte> write_gltf_lights(std::span<const GltfDirectionalLight> l
                                          const std::string& generator) {
   JsonArray definitions, nodes, roots;
   for (size_t i = 0; i < lights.size(); ++i) {
-    const std::string name = "light " + std::to_string(i);
-    definitions.push_back(light_json(lights[i], name));
+    definitions.push_back(light_json(lights[i]));
     JsonValue reference{JsonObject{}}, extensions{JsonObject{}}, node{JsonObject{}};
     reference.set("light", json_number(static_cast<double>(i)));
     extensions.set(kExtension, std::move(reference));
-    node.set("name", json_string(name));
+    node.set("name", json_string(lights[i].name));
     node.set("rotation", rotation_towards(lights[i].direction));
     node.set("extensions", std::move(extensions));
     nodes.push_back(std::move(node));

@@ -12,6 +12,7 @@
 namespace lightkiln {
 
 struct GltfDirectionalLight {
+  std::string name;
   Vec3d direction;   // unit, towards the light; its node's -Z looks the other way, as light travels
   Vec3d irradiance;  // on a facing surface, >= 0 and not all 0. In lux when radiance is in cd/m^2
 };
