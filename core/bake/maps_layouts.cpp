@@ -58,7 +58,8 @@ class LayoutImage : public MapsOutput {
  public:
   LayoutImage(size_t product, const LayoutOutput& order, const Environment& environment)
       : product_(product), layout_(layout_of(product, order)) {
-    const bool moved = moves_texels(environment.source_layout, layout_, environment.rotation);
+    const bool moved = moves_texels(environment.source_image_layout(), layout_,
+                                    environment.source_image_rotation());
     bound_ = moved || environment.constant ? 0 : kResampleError;
   }
 
@@ -74,15 +75,16 @@ class LayoutImage : public MapsOutput {
   MeasuredError make(MapsLight& light, int check_texels, ByteWriter& writer,
                      Progress& progress) const override {
     const Environment& environment = light.environment();
-    const MapLayout& from = environment.source_layout;
+    const MapLayout from = environment.source_image_layout();
+    const Rotation rotation = environment.source_image_rotation();
     const Image& source = environment.source_image();
-    const Image image = convert_layout(from, source, layout_, environment.rotation,
-                                       MapFilter::adaptive, light.threads(), progress);
+    const Image image = convert_layout(from, source, layout_, rotation, MapFilter::adaptive,
+                                       light.threads(), progress);
     writer.floats(image.pixels);
     writer.u64(check_texels > 0 ? 1 : 0);
     if (check_texels == 0) return {};
-    const RoundTrip trip = measure_round_trip(from, source, layout_, image, environment.rotation,
-                                              light.threads(), progress);
+    const RoundTrip trip =
+        measure_round_trip(from, source, layout_, image, rotation, light.threads(), progress);
     writer.f64(trip.relative_rms);
     writer.u64(trip.psnr_db ? 1 : 0);
     writer.f64(trip.psnr_db.value_or(0));

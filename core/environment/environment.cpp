@@ -71,6 +71,10 @@ void summarise(Environment* environment) {
 
 }  // namespace
 
+MapLayout Environment::source_image_layout() const {
+  return reduced ? make_layout(LayoutKind::latlong, radiance.width) : source_layout;
+}
+
 Environment make_environment(DecodedImage decoded, const SourceReading& reading,
                              const Rotation& rotation, int threads, Progress* progress) {
   Environment environment;

@@ -25,7 +25,12 @@ struct Environment {
   Rotation rotation;         // already applied to `radiance`
   double covered_share = 1;  // of the sphere, by the source; the rest is black
 
+  // What other layouts are converted from: the file's own pixels, or `radiance` where light has
+  // been taken out of it; `source` is then empty.
+  bool reduced = false;
   const Image& source_image() const { return source.pixels.empty() ? radiance : source; }
+  MapLayout source_image_layout() const;
+  Rotation source_image_rotation() const { return reduced ? Rotation{} : rotation; }
 };
 
 // Takes a decoded image: finds its layout, converts 1 channel to 3, sanitises and counts, turns and

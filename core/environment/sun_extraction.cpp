@@ -181,6 +181,8 @@ void take_out(const LatlongGrid& grid, const BrightSource& source, const Candida
     const Texel t = source.texels[i];
     std::copy_n(&candidate.fill[i].x, 3, image.at(t.x, t.y));
   }
+  environment->source = Image();
+  environment->reduced = true;
   const Vec3 first = image.rgb(0, 0);
   environment->constant = true;
   environment->max_luminance = 0;

@@ -137,6 +137,33 @@ TEST(MapsSun, ChangesNothingOnAMapWithoutOne) {
   EXPECT_FALSE(document_of(b).sun);
 }
 
+// Layouts are otherwise converted from the file's own pixels, which still hold the sun.
+TEST(MapsSun, IsGoneFromEveryLayoutOfATurnedMap) {
+  EnvironmentMapsParameters parameters;
+  parameters.rotation.yaw_degrees = 33;
+  for (size_t product = 0; product < kLayoutProducts; ++product) {
+    const std::string name = layout_product_name(product);
+    if (name != "latlong" && name != "octahedral") continue;
+    parameters.layouts[product].emplace();
+    parameters.layouts[product]->size = 128;
+  }
+  const auto brightest = [&](const Assembly& assembly, const char* name) {
+    const Image image = read_exr(artifact_of(assembly, name)->bytes).image;
+    return *std::max_element(image.pixels.begin(), image.pixels.end());
+  };
+  const Assembly whole = bake(order(parameters), exr_of(sunny_map()));
+  parameters.sun = SunOrder{};
+  const Assembly rest = bake(order(parameters), exr_of(sunny_map()));
+  ASSERT_TRUE(document_of(rest).sun->found);
+  for (const char* name : {"layout_latlong.exr", "layout_octahedral.exr"}) {
+    EXPECT_GT(brightest(whole, name), 1000) << name;
+    EXPECT_LT(brightest(rest, name), 2) << name;
+  }
+  // The document tells the file as it is.
+  EXPECT_EQ(document_of(rest).source_width, document_of(whole).source_width);
+  EXPECT_FALSE(document_of(rest).rotation.is_identity());
+}
+
 TEST(MapsSun, CanBeOrderedAlone) {
   EnvironmentMapsParameters parameters;
   parameters.sun = SunOrder{};
