@@ -70,7 +70,13 @@ ParameterGroup source_group() {
         +[](Spec& s) -> bool& { return parameters<T>(s).source.mirrored; },
         {},
         false,
-        kMirroredMeaning}},
+        kMirroredMeaning},
+       {"strict",
+        +[](Spec& s) -> bool& { return parameters<T>(s).source.strict; },
+        {},
+        false,
+        "NaN, infinite and negative pixels are refused with their counts; otherwise they are set "
+        "to 0 and counted."}},
       [](const Spec& s) { return !(parameters<T>(s).source == SourceParameters{}); },
       nullptr};
 }

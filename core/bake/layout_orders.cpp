@@ -6,7 +6,7 @@ namespace lightkiln {
 
 SourceReading reading_of(const SourceParameters& parameters) {
   return {parameters.layout, parameters.texel_convention, parameters.distance.value_or(0),
-          parameters.mirrored};
+          parameters.mirrored, parameters.strict};
 }
 
 Rotation rotation_of(const RotationParameters& parameters) {

@@ -27,6 +27,8 @@ struct SourceParameters {
   // angular, mirror_ball: left and right are exchanged, as on a photograph of a ball. Refused for
   // other layouts.
   bool mirrored = false;
+  // NaN, infinite and negative pixels are refused with their counts; else set to 0 and counted.
+  bool strict = false;
 
   friend bool operator==(const SourceParameters&, const SourceParameters&) = default;
 };

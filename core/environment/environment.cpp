@@ -69,6 +69,14 @@ void summarise(Environment* environment) {
   environment->max_luminance = brightest;
 }
 
+void refuse_repairs(const PixelRepairs& repairs) {
+  if (repairs.nan + repairs.infinite + repairs.negative == 0) return;
+  throw Error(ErrorCode::invalid_input,
+              "The environment holds values that strict refuses: " + std::to_string(repairs.nan) +
+                  " NaN, " + std::to_string(repairs.infinite) + " infinite and " +
+                  std::to_string(repairs.negative) + " negative.");
+}
+
 }  // namespace
 
 MapLayout Environment::source_image_layout() const {
@@ -83,6 +91,7 @@ Environment make_environment(DecodedImage decoded, const SourceReading& reading,
   environment.covered_share = covered_solid_angle(environment.source_layout) / (4 * kPi);
   Image image = to_rgb(std::move(decoded.image));
   environment.repairs = sanitise(image);
+  if (reading.strict) refuse_repairs(environment.repairs);
   const bool turned = !rotation.is_identity();
   const std::optional<int> columns = whole_columns(environment.source_layout, rotation);
   if (columns && *columns == 0) {

@@ -37,7 +37,9 @@ struct Environment {
 // brings to a half-texel lat-long of holding_width(). A half-texel lat-long map is kept as it is,
 // and a yaw of whole texels only moves its columns; otherwise the map is converted (see
 // layout_convert.h, adaptive). Throws Error{invalid_input}: the shape does not fit the layout (a
-// photograph). Hand the image over with std::move: an 8192 x 4096 map takes 384 MiB.
+// photograph), or `reading.strict` and
+// NaN, infinite or negative pixels, with their counts. Hand the image over with std::move: an 8192
+// x 4096 map takes 384 MiB.
 Environment make_environment(DecodedImage decoded, const SourceReading& reading = {},
                              const Rotation& rotation = {}, int threads = 1,
                              Progress* progress = nullptr);

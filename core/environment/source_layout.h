@@ -16,6 +16,7 @@ struct SourceReading {
   std::optional<TexelConvention> convention = {};
   double camera_distance = 0;  // mirror_ball: as in MapLayout
   bool mirrored = false;       // angular, mirror_ball: as in MapLayout
+  bool strict = false;         // refuses pixels that would be repaired
 };
 
 // The layout of a file: the one that is said, else the one its `envmap` attribute names, else

@@ -37,6 +37,24 @@ TEST(Environment, CountsNanInfiniteAndNegativeByKind) {
   EXPECT_TRUE(std::isfinite(a.mean.x));
 }
 
+TEST(Environment, RefusesThemWithTheirCountsWhenStrict) {
+  Image dirty = reference::test_sky(16, 10);
+  const SourceReading strict{.strict = true};
+  EXPECT_NO_THROW(make_environment(decoded(dirty), strict));
+  dirty.at(1, 5)[0] = dirty.at(2, 5)[1] = NAN;
+  dirty.at(3, 5)[2] = -INFINITY;
+  for (int i = 4; i < 7; ++i) dirty.at(i, 5)[0] = -1e-6f;
+  EXPECT_NO_THROW(make_environment(decoded(dirty)));
+  try {
+    make_environment(decoded(dirty), strict);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::invalid_input);
+    EXPECT_NE(std::string(error.what()).find("2 NaN, 1 infinite and 3 negative"), std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(Environment, KnowsAConstantMapAndItsMean) {
   Image map(8, 4, 3);
   for (float& v : map.pixels) v = 0.7f;
