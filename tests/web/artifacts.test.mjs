@@ -39,6 +39,30 @@ test("the baked GLB passes the glTF validator and carries one _AO a vertex", asy
   }
 });
 
+test("sun and light set pass the glTF validator and hold the map's energy", async () => {
+  const order = (spec) => ({ ...spec, parameters: { sun: {}, light_set: { lights: 8 } } });
+  const baked = await finished(daemon.url, (await orderDemo(daemon.url, "environment_maps", order)).id);
+  assert.equal(baked.state, "succeeded", JSON.stringify(baked.error));
+  const { items } = await (await fetch(`${daemon.url}${baked.links.artifacts}`)).json();
+  const fetched = async (name) => {
+    const item = items.find((candidate) => candidate.name === name);
+    return item && new Uint8Array(await (await fetch(`${daemon.url}${item.href}`)).arrayBuffer());
+  };
+  const document = JSON.parse(new TextDecoder().decode(await fetched("environment_maps.json")));
+  assert.equal(document.sun.found, (await fetched("sun.gltf")) !== undefined);
+  for (const name of document.sun.found ? ["sun.gltf", "light_set.gltf"] : ["light_set.gltf"]) {
+    const bytes = await fetched(name);
+    const report = await validator.validateBytes(bytes);
+    assert.equal(report.issues.numErrors + report.issues.numWarnings, 0, JSON.stringify(report.issues.messages));
+    const { lights } = JSON.parse(new TextDecoder().decode(bytes)).extensions.KHR_lights_punctual;
+    const expected = name === "sun.gltf" ? document.sun.disk.irradiance : document.sun.energy_after;
+    for (let c = 0; c < 3; c += 1) {
+      const sum = lights.reduce((total, light) => total + light.intensity * light.color[c], 0);
+      assert.ok(Math.abs(sum - expected[c]) <= 1e-9 * expected[c], `${name}: ${sum} is not ${expected[c]}`);
+    }
+  }
+});
+
 test("the daemon's answers are what its OpenAPI document says", async () => {
   const openapi = await (await fetch(`${daemon.url}/openapi.json`)).json();
   assert.deepEqual(openapi, JSON.parse(readFileSync(join(project, "proto", "openapi.json"), "utf8")));
