@@ -42,15 +42,7 @@ int bands_of(const MapsOutputs& outputs) {
 
 }  // namespace
 
-namespace {
-
-std::optional<SunOptions> sun_options(const Spec& spec) {
-  const auto& sun = std::get<EnvironmentMapsParameters>(spec.parameters).sun;
-  if (!sun) return {};
-  return SunOptions{sun->max_angular_radius_degrees * kPi / 180, sun->min_contrast};
-}
-
-}  // namespace
+namespace {}  // namespace
 
 std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_maps_open(
     const Spec& spec, const Inputs& inputs, const Grants& grants) {
@@ -63,7 +55,7 @@ std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_m
       light_warnings(decoded),
       MapsLight(make_environment(std::move(decoded), reading_of(parameters.source),
                                  rotation_of(parameters.rotation), grants.threads),
-                grants.threads, sun_options(spec)),
+                grants.threads, sun_options(parameters)),
       {}});
   state->outputs =
       order_outputs(state->parameters(), state->light, working_target(state->target()));

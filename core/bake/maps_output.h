@@ -68,6 +68,9 @@ std::vector<LobePlan> lobes_of(const MapsOutputs& outputs);
 int sh_bands_of(const MapsOutputs& outputs);
 void require_spectrum(const MapsOutputs& outputs, MapsLight* light);
 
+// What is to be taken out of the map before any output is made; none when no sun is ordered.
+std::optional<SunOptions> sun_options(const EnvironmentMapsParameters& parameters);
+
 // The bound that an order of `target_error` is baked to. A bound is an rms over the sphere; a tenth
 // of the order leaves room for the single texel.
 double working_target(double target_error);

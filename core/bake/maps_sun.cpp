@@ -73,6 +73,12 @@ Effect sun_effect(const MapsLight& light) {
 
 }  // namespace
 
+std::optional<SunOptions> sun_options(const EnvironmentMapsParameters& parameters) {
+  if (!parameters.sun) return {};
+  return SunOptions{parameters.sun->max_angular_radius_degrees * kPi / 180,
+                    parameters.sun->min_contrast};
+}
+
 const MapsProduct kSunProduct = {"sun",
                                  "A sun is taken out of the map.",
                                  false,

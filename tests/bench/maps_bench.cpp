@@ -23,6 +23,7 @@ namespace {
 
 struct Order {
   int height, repetitions, checks;
+  bool whole_ladder;
 };
 
 struct Point {
@@ -48,7 +49,7 @@ Baked bake_once(const Environment& map, const EnvironmentMapsParameters& paramet
                 int checks) {
   Progress progress;
   const double start_s = process_cpu_seconds();
-  MapsLight light(map, 0);
+  MapsLight light(map, 0, sun_options(parameters));
   const MapsOutputs outputs = order_outputs(parameters, light, working_target(target));
   require_spectrum(outputs, &light);
   Baked baked;
@@ -87,11 +88,13 @@ std::vector<Point> climb(const Environment& map, const Order& order) {
     const bool product = std::any_of(products.begin(), products.end(),
                                      [&](const MapsProduct& p) { return name == p.name; });
     if (!product || !group.create) continue;
-    for (const double target : {1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4}) {
+    for (const double target : kQuotedErrors) {
       points.push_back(measure(map, group, name, target, order));
       const Point& p = points.back();
       std::printf("%-12s %9.1e %9.1e %11.2e %11.2e %9.4f %6d\n", p.product.c_str(), p.target,
                   p.bound, p.measured.rms, p.measured.max, p.cpu_s, p.bands);
+      std::fflush(stdout);
+      if (!order.whole_ladder) break;
     }
   }
   return points;
@@ -122,11 +125,11 @@ std::string write_points(const std::vector<Point>& points, const Image& map) {
 }
 
 int run(int argc, char** argv) {
-  Order order{1024, 5, 16};
+  Order order{1024, 3, 16, true};
   std::string json, file;
   for (int i = 1; i < argc; ++i) {
     if (!std::strcmp(argv[i], "--smoke"))
-      order = {32, 1, 1};
+      order = {32, 1, 1, false};
     else if (!std::strcmp(argv[i], "--json") && i + 1 < argc)
       json = argv[++i];
     else

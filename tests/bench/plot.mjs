@@ -50,7 +50,13 @@ function drawPanel(product, points, origin) {
   return lines;
 }
 
-function draw({ map, points }) {
+// A log-log plot has no place for what took no time, or what errs by nothing at any price.
+function drawable(points) {
+  return points.filter((p) => p.cpu_s > 0 && (p.bound > 0 || p.rms > 0));
+}
+
+function draw({ map, points: all }) {
+  const points = drawable(all);
   const products = [...new Set(points.map((p) => p.product))];
   const rows = Math.ceil(products.length / columns);
   const width = columns * panel.width;
