@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/bake/maps_cost.h"
+#include "core/base/parallel.h"
 #include "core/base/text.h"
 #include "core/environment/brute_force.h"
 #include "core/environment/charlie_lobe.h"
@@ -78,17 +79,26 @@ Vec3d slow_average(const Environment& environment, const Lobe& lobe, const Vec3d
 
 MeasuredError ConvolvedCube::check(MapsLight& light, const Image& cube, int count,
                                    Progress& progress) const {
-  ErrorMeter meter(scale_ * luminance(light.environment().mean));
   const size_t side = static_cast<size_t>(size_);
-  for (int i = 0; i < count; ++i) {
-    progress.check();
-    const size_t index = check_index(i, 6 * side * side);
-    const int x = static_cast<int>(index % side), y = static_cast<int>(index / side);
-    const Vec3d truth = lobe_ ? slow_average(light.environment(), *lobe_,
-                                             cube_texel_direction(y / size_, x, y % size_, size_)) *
-                                    scale_
-                              : texel_average(light.environment(), y / size_, x, y % size_, size_);
-    meter.add(to_double(cube.rgb(x, y)), truth);
+  const auto texel = [&](size_t i) {
+    const size_t index = check_index(static_cast<int>(i), 6 * side * side);
+    return std::pair(static_cast<int>(index % side), static_cast<int>(index / side));
+  };
+  std::vector<Vec3d> truths(static_cast<size_t>(count));
+  parallel_blocks(
+      truths.size(), 1, light.threads(), progress,
+      [&](size_t i, size_t) {
+        const auto [x, y] = texel(i);
+        truths[i] = lobe_ ? slow_average(light.environment(), *lobe_,
+                                         cube_texel_direction(y / size_, x, y % size_, size_)) *
+                                scale_
+                          : texel_average(light.environment(), y / size_, x, y % size_, size_);
+      },
+      1, 1);
+  ErrorMeter meter(scale_ * luminance(light.environment().mean));
+  for (size_t i = 0; i < truths.size(); ++i) {
+    const auto [x, y] = texel(i);
+    meter.add(to_double(cube.rgb(x, y)), truths[i]);
   }
   return meter.result();
 }
