@@ -1,3 +1,5 @@
+// Tags beside tests are explained in tests/support/hard_cases.h.
+
 #include "core/environment/layout_convert.h"
 
 #include <algorithm>
@@ -258,7 +260,7 @@ TEST(ConvertLayout, NeitherRingsNorGoesNegativeWhenEnlarging) {
   }
 }
 
-// NUMERICS M5: neighbours across a seam differ no more than neighbours inside, also where a coarse
+// M5: neighbours across a seam differ no more than neighbours inside, also where a coarse
 // map is enlarged: read along a circle that crosses seams, corners and poles.
 TEST(ConvertLayout, IsContinuousAcrossSeamsWhenEnlarged) {
   for (const MapLayout& from : targets(12)) {

@@ -1,3 +1,5 @@
+// Tags beside tests are explained in tests/support/hard_cases.h.
+
 #include "core/sphere/map_layout.h"
 
 #include <array>
@@ -103,7 +105,7 @@ TEST(MapLayout, BringsAxesEdgesAndCornersBack) {
   }
 }
 
-// NUMERICS M4: the rim is the direction behind the ball.
+// M4: the rim is the direction behind the ball.
 TEST(MapLayout, ShowsWhatIsBehindTheBallAllAlongItsRim) {
   const MapLayout ball = make_layout(LayoutKind::mirror_ball, 512);
   for (int i = 0; i < 360; ++i) {
@@ -165,7 +167,7 @@ TEST(MapLayout, AgreesWithItsOwnDensity) {
   }
 }
 
-// The measures of NUMERICS M4 and their neighbours.
+// The measures of M4 and their neighbours.
 TEST(MapLayout, HasTheDensitiesOfTheBooks) {
   const MapLayout ball = make_layout(LayoutKind::mirror_ball, 64);
   const MapLayout angular = make_layout(LayoutKind::angular, 64);

@@ -1,7 +1,8 @@
 #pragma once
 
-// What the tags beside some tests mean. Each names one way in which a baker goes wrong, or one scene
-// whose answer is a formula; a test that carries the tag would fail if we went wrong that way.
+// What the tags beside some tests mean. Each names one way in which a baker goes wrong, or one
+// scene whose answer is a formula; a test that carries the tag would fail if we went wrong that
+// way.
 //
 // Openness with a closed form
 //   A1   convex solids are fully open, closed rooms fully shut
@@ -26,6 +27,9 @@
 //   G10  rays about a shading normal start into the surface
 //   G11  rays that are not finite, or of no direction
 //   G13  faces given twice weigh twice
+// Environment maps
+//   M4   a mirror ball is of equal area, and its whole rim one direction
+//   M5   filters that stop at the faces of a cube show lines
 // Sums and repeatability
 //   R1   a running sum of floats stops growing
 //   R2   variance as a difference of squares cancels
