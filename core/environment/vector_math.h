@@ -7,8 +7,8 @@
 
 namespace lightkiln {
 
-// exp(-z) for z >= 0, next to 0 beyond 64: a Taylor polynomial of z / 64, squared six times; relative
-// error under 1e-9 up to z = 24 and 5e-6 beyond.
+// exp(-z) for z >= 0, next to 0 beyond 64: a Taylor polynomial of z / 64, squared six times;
+// relative error under 1e-9 up to z = 24 and 5e-6 beyond.
 inline double exp_minus(double z) {
   const double x = (z < 64 ? z : 64) * (1.0 / 64);
   double p = 1.0 / 3628800;

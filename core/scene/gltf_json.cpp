@@ -132,7 +132,8 @@ void JsonAt::expect_object() const {
 
 std::optional<JsonAt> JsonAt::find(std::string_view key) const {
   expect_object();
-  if (const JsonValue* member = value_->find(key)) return JsonAt(*member, pointer_below(where_, key));
+  if (const JsonValue* member = value_->find(key))
+    return JsonAt(*member, pointer_below(where_, key));
   return std::nullopt;
 }
 
