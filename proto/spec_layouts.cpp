@@ -8,15 +8,6 @@ namespace {
 
 using Maps = EnvironmentMapsParameters;
 
-template <typename T>
-T& parameters(Spec& spec) {
-  return std::get<T>(spec.parameters);
-}
-template <typename T>
-const T& parameters(const Spec& spec) {
-  return std::get<T>(spec.parameters);
-}
-
 constexpr Range kDistance{1, 1e6, true};
 constexpr std::string_view kDistanceMeaning =
     "Distance of the camera from the ball's centre in radii of the ball. null = infinitely far.";

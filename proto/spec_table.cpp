@@ -13,15 +13,6 @@ using Ao = AmbientOcclusionParameters;
 using Maps = EnvironmentMapsParameters;
 using Probes = ProbesParameters;
 
-template <typename T>
-T& parameters(Spec& spec) {
-  return std::get<T>(spec.parameters);
-}
-template <typename T>
-const T& parameters(const Spec& spec) {
-  return std::get<T>(spec.parameters);
-}
-
 constexpr double kWhole64 = 18446744073709551615.0;
 constexpr Range kPositive{0, 1e300, true};
 

@@ -13,6 +13,16 @@
 
 namespace lightkiln {
 
+// The parameters of a spec whose kind is known.
+template <typename T>
+T& parameters(Spec& spec) {
+  return std::get<T>(spec.parameters);
+}
+template <typename T>
+const T& parameters(const Spec& spec) {
+  return std::get<T>(spec.parameters);
+}
+
 // A member of one of the enumerations, by position in `names`.
 struct NameMember {
   std::vector<std::string_view> names;
