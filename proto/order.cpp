@@ -68,7 +68,7 @@ class Resolver {
  public:
   explicit Resolver(const fs::path& folder) : folder_(folder) {}
 
-  // An input of any of the three forms, as digests.
+  // An input of any of the four forms, as digests.
   JsonValue input(const JsonValue& given, const std::string& pointer) {
     if (const std::string* text = given.string()) {
       const fs::path path = folder_ / *text;
@@ -85,11 +85,12 @@ class Resolver {
       const std::string at = pointer + "/" + json_pointer_token(member.key);
       if (member.key == "blob" && member.value.string())
         member.value = JsonValue(file_or_digest(*member.value.string(), at));
-      if (member.key != "resources" || !member.value.object()) continue;
-      for (JsonMember& resource : *member.value.object())
-        if (resource.value.string())
-          resource.value = JsonValue(file_or_digest(*resource.value.string(),
-                                                    at + "/" + json_pointer_token(resource.key)));
+      const bool files = member.key == "resources" || member.key == "faces";
+      if (!files || !member.value.object()) continue;
+      for (JsonMember& file : *member.value.object())
+        if (file.value.string())
+          file.value = JsonValue(
+              file_or_digest(*file.value.string(), at + "/" + json_pointer_token(file.key)));
     }
     return copy;
   }

@@ -25,7 +25,8 @@ struct Order {
 };
 
 // Reads the order file at `path`; paths in it are relative to its folder. An input may be a path, a
-// digest, or {"blob": path or digest, "resources": {URI: path or digest}}. Throws Error: not_found
+// digest, {"blob": path or digest, "resources": {URI: path or digest}}, or {"faces": {name: path or
+// digest}}. Throws Error: not_found
 // when the order file cannot be read, invalid_spec when it is no JSON object or names a file that
 // cannot be read (where() has the pointer).
 Order read_order(const std::filesystem::path& path);

@@ -71,6 +71,12 @@ JsonValue::Object& object_at(JsonValue* root, std::string_view path) {
 }
 
 JsonValue input_json(const InputRef& input) {
+  if (!input.faces.empty()) {
+    JsonValue::Object faces;
+    for (size_t i = 0; i < input.faces.size(); ++i)
+      faces.push_back({kCubeFaceNames.at(i), JsonValue(input.faces[i])});
+    return JsonValue(JsonValue::Object{{"faces", JsonValue(std::move(faces))}});
+  }
   if (input.resources.empty()) return JsonValue(input.blob);
   JsonValue::Object resources;
   for (const auto& [uri, digest] : input.resources) resources.push_back({uri, JsonValue(digest)});
@@ -114,7 +120,8 @@ std::vector<std::string> input_digests(const Spec& spec) {
   std::vector<std::string> digests;
   for (const std::optional<InputRef>* input : {&spec.scene, &spec.environment}) {
     if (!*input) continue;
-    digests.push_back((*input)->blob);
+    if ((*input)->faces.empty()) digests.push_back((*input)->blob);
+    digests.insert(digests.end(), (*input)->faces.begin(), (*input)->faces.end());
     for (const auto& [uri, digest] : (*input)->resources) digests.push_back(digest);
   }
   std::sort(digests.begin(), digests.end());

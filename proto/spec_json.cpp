@@ -221,21 +221,44 @@ void read_resources(const JsonPlace& place, InputRef* out) {
   std::sort(out->resources.begin(), out->resources.end());
 }
 
-InputRef read_input(const JsonPlace& place) {
-  static constexpr std::string_view kKnown[] = {"blob", "resources"};
+// All six, in our order whatever the order of the members.
+void read_faces(const JsonPlace& place, InputRef* out) {
+  const std::vector<std::string_view> known(kCubeFaceNames.begin(), kCubeFaceNames.end());
+  out->faces.resize(known.size());
+  if (!read_object(place, known)) return;
+  for (size_t i = 0; i < known.size(); ++i) {
+    if (const JsonValue* face = place.value->find(known[i]))
+      read_digest(place.child(known[i], *face), &out->faces[i]);
+    else
+      place.faults->add({place.pointer + "/" + std::string(known[i]), "missing",
+                         "The face " + std::string(known[i]) + " is missing; a cube has six.",
+                         "sha256:<64 hex>", ""});
+  }
+}
+
+InputRef read_input(const JsonPlace& place, const InputRow& row) {
   InputRef input;
   if (!place.value->object()) {
     read_digest(place, &input.blob);
     return input;
   }
-  read_object(place, kKnown);
+  const std::string_view known[] = {"blob", row.image ? "faces" : "resources"};
+  read_object(place, known);
+  const JsonValue* faces = row.image ? place.value->find("faces") : nullptr;
+  if (faces) {
+    read_faces(place.child("faces", *faces), &input);
+    if (place.value->find("blob"))
+      place.faults->add({place.pointer + "/blob", "conflict",
+                         "An environment is one file or six faces, not both.", "", ""});
+    return input;
+  }
   if (const JsonValue* blob = place.value->find("blob"))
     read_digest(place.child("blob", *blob), &input.blob);
   else
     place.faults->add({place.pointer + "/blob", "missing",
                        "The digest of the main file is missing.", "sha256:<64 hex>", ""});
-  if (const JsonValue* resources = place.value->find("resources"))
-    read_resources(place.child("resources", *resources), &input);
+  const JsonValue* resources = row.image ? nullptr : place.value->find("resources");
+  if (resources) read_resources(place.child("resources", *resources), &input);
   return input;
 }
 
@@ -248,7 +271,7 @@ void read_inputs(const JsonPlace& root, const KindTable& table, Spec* spec) {
   for (const InputRow& row : table.inputs) {
     const JsonValue* input = inputs ? inputs->find(row.name) : nullptr;
     if (input)
-      (*spec).*row.member = read_input(place.child(row.name, *input));
+      (*spec).*row.member = read_input(place.child(row.name, *input), row);
     else if (row.required)
       place.faults->add({place.pointer + "/" + std::string(row.name), "missing",
                          "The input \"" + std::string(row.name) + "\" is missing; " +

@@ -62,6 +62,19 @@ ParameterGroup source_group() {
         {},
         false,
         kMirroredMeaning},
+       {"face_orientation",
+        NameMember{{"openexr", "opengl"},
+                   [](const Spec& s) {
+                     return static_cast<size_t>(parameters<T>(s).source.face_orientation);
+                   },
+                   [](Spec& s, size_t i) {
+                     parameters<T>(s).source.face_orientation = FaceOrientation(i);
+                   }},
+        {},
+        false,
+        "How the faces of a cube_strip or of six files are turned. openexr: as OpenEXR's cube. "
+        "opengl: as the six images that OpenGL, Direct3D and engines on them look up, whose world "
+        "is (-x, y, z); px then shows what lies at -X of ours."},
        {"strict",
         +[](Spec& s) -> bool& { return parameters<T>(s).source.strict; },
         {},

@@ -101,7 +101,7 @@ KindTable ambient_occlusion_table() {
         "How directions of the hemisphere are weighted."}}};
   return {Kind::ambient_occlusion,
           "Openness at every vertex of a scene: 1 = open sky.",
-          {{"scene", &Spec::scene, true}},
+          {{"scene", &Spec::scene, true, false}},
           {root_group(), without(accuracy_group(), {"check_texels"}), own}};
 }
 
@@ -320,7 +320,7 @@ KindTable environment_maps_table() {
   return {Kind::environment_maps,
           "Coefficients, irradiance, prefiltered chains and the DFG table of an environment "
           "map, and the map in any layout.",
-          {{"environment", &Spec::environment, true}},
+          {{"environment", &Spec::environment, true, true}},
           groups};
 }
 
@@ -353,7 +353,7 @@ KindTable probes_table() {
                       kProbeBands, false, kBandsMeaning}}});
   return {Kind::probes,
           "A radiance cubemap, coefficients, a distance cube and validity at each listed position.",
-          {{"scene", &Spec::scene, true}, {"environment", &Spec::environment, false}},
+          {{"scene", &Spec::scene, true, false}, {"environment", &Spec::environment, false, true}},
           groups};
 }
 

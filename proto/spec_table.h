@@ -78,6 +78,7 @@ struct InputRow {
   std::string_view name;
   std::optional<InputRef> Spec::*member;
   bool required;
+  bool image;  // of light: one file or six faces; else a scene, which may have resources
 };
 
 struct KindTable {

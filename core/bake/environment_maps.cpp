@@ -47,13 +47,14 @@ namespace {}  // namespace
 std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_maps_open(
     const Spec& spec, const Inputs& inputs, const Grants& grants) {
   const auto& parameters = std::get<EnvironmentMapsParameters>(spec.parameters);
-  DecodedImage decoded = decode_light_image(blob_bytes(spec.environment.value(), inputs));
+  DecodedImage decoded = decode_environment(spec.environment.value(), inputs);
   std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> state(new EnvironmentMapsState{
       spec,
       grants,
       decoded.format,
       light_warnings(decoded),
-      MapsLight(make_environment(std::move(decoded), reading_of(parameters.source),
+      MapsLight(make_environment(std::move(decoded),
+                                 environment_reading(*spec.environment, parameters.source),
                                  rotation_of(parameters.rotation), grants.threads),
                 grants.threads, sun_options(parameters)),
       {}});

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/environment/cube_faces.h"
+#include "core/image/decode.h"
+
 namespace lightkiln {
 
 namespace {
@@ -20,6 +23,26 @@ std::span<const std::byte> blob_of(const std::string& digest, const Inputs& inpu
 
 std::span<const std::byte> blob_bytes(const InputRef& ref, const Inputs& inputs) {
   return blob_of(ref.blob, inputs);
+}
+
+DecodedImage decode_environment(const InputRef& ref, const Inputs& inputs) {
+  if (ref.faces.empty()) return decode_light_image(blob_bytes(ref, inputs));
+  std::array<DecodedImage, 6> faces;
+  for (size_t i = 0; i < faces.size(); ++i) {
+    try {
+      faces[i] = decode_light_image(blob_of(ref.faces.at(i), inputs));
+    } catch (const Error& error) {
+      throw Error(error.code(), std::string("The face ") + kCubeFaceNames[i] + ": " + error.what(),
+                  error.where());
+    }
+  }
+  return join_faces(std::move(faces));
+}
+
+SourceReading environment_reading(const InputRef& ref, const SourceParameters& parameters) {
+  SourceReading reading = reading_of(parameters);
+  if (!ref.faces.empty()) reading.layout = LayoutKind::cube_strip;
+  return reading;
 }
 
 GltfSource gltf_source(const InputRef& ref, const Inputs& inputs) {

@@ -5,8 +5,8 @@
 namespace lightkiln {
 
 SourceReading reading_of(const SourceParameters& parameters) {
-  return {parameters.layout, parameters.texel_convention, parameters.distance.value_or(0),
-          parameters.mirrored, parameters.strict};
+  return {parameters.layout,   parameters.texel_convention, parameters.distance.value_or(0),
+          parameters.mirrored, parameters.face_orientation, parameters.strict};
 }
 
 Rotation rotation_of(const RotationParameters& parameters) {

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/environment/cube_faces.h"
 #include "core/environment/source_layout.h"
 #include "core/sphere/map_layout.h"
 #include "core/sphere/rotation.h"
@@ -27,6 +28,8 @@ struct SourceParameters {
   // angular, mirror_ball: left and right are exchanged, as on a photograph of a ball. Refused for
   // other layouts.
   bool mirrored = false;
+  // Of a cube_strip, or of a cube that comes as six files. Refused for other layouts.
+  FaceOrientation face_orientation = FaceOrientation::openexr;
   // NaN, infinite and negative pixels are refused with their counts; else set to 0 and counted.
   bool strict = false;
 

@@ -22,8 +22,8 @@ std::unique_ptr<ProbesState, ProbesStateDeleter> probes_open(const Spec& spec, c
   state->scene = load_gltf(gltf_source(*spec.scene, inputs), {});
   if (spec.environment) {
     state->environment = make_environment(
-        decode_light_image(blob_bytes(*spec.environment, inputs)),
-        reading_of(std::get<ProbesParameters>(spec.parameters).source),
+        decode_environment(*spec.environment, inputs),
+        environment_reading(*spec.environment, std::get<ProbesParameters>(spec.parameters).source),
         rotation_of(std::get<ProbesParameters>(spec.parameters).rotation), grants.threads);
   }
   state->survey = survey_light(state->scene, state->light());

@@ -94,7 +94,22 @@ bool is_plain_uri(const std::string& uri) {
   return true;
 }
 
+void check_faces(const InputRef& input, const std::string& pointer, Checker& checker) {
+  if (!input.blob.empty() || !input.resources.empty())
+    checker.fault(pointer, "conflict",
+                  "An environment is one file or six faces: faces stand without blob and without "
+                  "resources.");
+  if (input.faces.size() != kCubeFaceNames.size())
+    checker.fault(pointer + "/faces", "missing", "A cube has six faces: px, nx, py, ny, pz, nz.");
+  for (size_t i = 0; i < std::min(input.faces.size(), kCubeFaceNames.size()); ++i) {
+    if (!is_blob_digest(input.faces[i]))
+      checker.fault(pointer + "/faces/" + kCubeFaceNames[i], "type",
+                    "A face is a digest \"sha256:\" followed by 64 lower-case hexadecimal digits.");
+  }
+}
+
 void check_input(const InputRef& input, const std::string& pointer, Checker& checker) {
+  if (!input.faces.empty()) return check_faces(input, pointer, checker);
   if (!is_blob_digest(input.blob))
     checker.fault(pointer, "type",
                   "An input is a digest \"sha256:\" followed by 64 lower-case hexadecimal digits.");
@@ -161,8 +176,16 @@ void check_distance(const std::optional<double>& distance, const std::string& po
                   "distance must be above 1, the ball's own radius, and at most 1e6.");
 }
 
-void check_source(const SourceParameters& p, Checker& checker) {
+void check_source(const SourceParameters& p, const Spec& spec, Checker& checker) {
   const std::string pointer = "/parameters/source";
+  const bool six_files = spec.environment && !spec.environment->faces.empty();
+  if (six_files && p.layout && p.layout != LayoutKind::cube_strip)
+    checker.fault(pointer + "/layout", "conflict",
+                  "Six faces are a cube: layout is auto or cube_strip.", "auto, cube_strip");
+  if (p.face_orientation != FaceOrientation::openexr && !six_files &&
+      p.layout != LayoutKind::cube_strip)
+    checker.fault(pointer + "/face_orientation", "conflict",
+                  "face_orientation belongs to six faces and to the layout cube_strip.");
   const bool ball = p.layout == LayoutKind::mirror_ball;
   if (p.distance && !ball)
     checker.fault(pointer + "/distance", "conflict", "distance belongs to the layout mirror_ball.");
@@ -276,7 +299,6 @@ void check_environment_maps(const EnvironmentMapsParameters& p, Checker& checker
         "/parameters", "missing",
         "Order at least one of sun, sh, irradiance, prefilter, sheen, dfg, spectrum, asset, "
         "layouts and light_set.");
-  check_source(p.source, checker);
   check_rotation(p.rotation, checker);
   check_layouts(p.layouts, checker);
   if (p.sh) check_sh(*p.sh, checker);
@@ -311,7 +333,6 @@ void check_probe_bytes(const ProbesParameters& p, Checker& checker) {
 }
 
 void check_probes(const ProbesParameters& p, Checker& checker) {
-  check_source(p.source, checker);
   check_rotation(p.rotation, checker);
   constexpr size_t kMostPositions = 10000;
   if (p.positions.empty() || p.positions.size() > kMostPositions)
@@ -382,16 +403,20 @@ std::vector<SpecFault> validate(const Spec& spec) {
     case Kind::environment_maps:
       refuse_input(spec.scene, "scene", kind, checker);
       require_input(spec.environment, "environment", kind, checker);
+      check_source(std::get<EnvironmentMapsParameters>(spec.parameters).source, spec, checker);
       check_environment_maps(std::get<EnvironmentMapsParameters>(spec.parameters), checker);
       refuse_sampling(spec, checker);
       break;
     case Kind::probes:
       require_input(spec.scene, "scene", kind, checker);
+      check_source(std::get<ProbesParameters>(spec.parameters).source, spec, checker);
       check_probes(std::get<ProbesParameters>(spec.parameters), checker);
       refuse_checks(spec, checker);
       break;
   }
   if (spec.scene) check_input(*spec.scene, "/inputs/scene", checker);
+  if (spec.scene && !spec.scene->faces.empty())
+    checker.fault("/inputs/scene/faces", "conflict", "A scene has no faces; an environment has.");
   if (spec.environment) check_input(*spec.environment, "/inputs/environment", checker);
   check_accuracy(spec.accuracy, checker);
   return checker.take();

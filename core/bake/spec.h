@@ -152,10 +152,12 @@ enum class Kind { ambient_occlusion, environment_maps, probes };
 inline constexpr Kind kKinds[] = {Kind::ambient_occlusion, Kind::environment_maps, Kind::probes};
 const char* kind_name(Kind kind);
 
-// A blob by its digest "sha256:<64 hex>", or a .gltf with the blobs that its URIs name.
+// A blob by its digest "sha256:<64 hex>", a .gltf with the blobs that its URIs name, or
+// (environment alone) the six faces of a cube as six blobs.
 struct InputRef {
-  std::string blob;
+  std::string blob;                                            // "" = faces
   std::vector<std::pair<std::string, std::string>> resources;  // (URI, digest), sorted by URI
+  std::vector<std::string> faces = {};  // +X -X +Y -Y +Z -Z as in kCubeFaceNames; empty = a blob
 };
 
 struct Accuracy {

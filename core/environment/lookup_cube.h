@@ -1,15 +1,27 @@
 #pragma once
 
-// A cube as graphics interfaces look it up, for viewers that take six images.
+// A cube as graphics interfaces look it up: the six images that OpenGL, Direct3D, WebGL and the
+// engines above them take and give.
+//
+// Theirs are cube map faces of OpenGL's table in a left-handed world (-x, y, z): a cube seen from
+// inside shows what it should in a world of the other hand. Ours of +-X are theirs of -+X. Texels
+// are moved, never filtered.
 
 #include "core/image/image.h"
 
 namespace lightkiln {
 
-// Face 0..5 = +X -X +Y -Y +Z -Z of `cube` (our strip of six faces, direction_map.h) as the six
-// images of EXT_lights_image_based: OpenGL's cube map faces in the left-handed world (-x, y, z) of
-// the extension's viewers (sh_target_axes), bottom row first. Ours of +-X are theirs of -+X. Texels
-// are moved, never filtered.
-Image lookup_face(const Image& cube, int face);
+// How the six square images of a cube, +X -X +Y -Y +Z -Z, are turned.
+enum class FaceOrientation {
+  openexr,  // as OpenEXR's cube, which is ours: see direction_map.h
+  opengl,   // as above, rows from the top as image files have them
+};
+
+// Strips of six faces, N x 6N, from one orientation to the other.
+Image strip_to_opengl(const Image& strip);
+Image strip_from_opengl(const Image& strip);
+
+// Face 0..5 of our strip as an image of EXT_lights_image_based: OpenGL's, bottom row first.
+Image lookup_face(const Image& strip, int face);
 
 }  // namespace lightkiln

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "core/environment/lookup_cube.h"
 #include "core/image/exr.h"
 #include "core/sphere/map_layout.h"
 
@@ -16,7 +17,8 @@ struct SourceReading {
   std::optional<TexelConvention> convention = {};
   double camera_distance = 0;  // mirror_ball: as in MapLayout
   bool mirrored = false;       // angular, mirror_ball: as in MapLayout
-  bool strict = false;         // refuses pixels that would be repaired
+  FaceOrientation face_orientation = FaceOrientation::openexr;  // cube_strip
+  bool strict = false;  // refuses pixels that would be repaired
 };
 
 // The layout of a file: the one that is said, else the one its `envmap` attribute names, else

@@ -33,6 +33,9 @@ std::vector<SpecFault> missing_inputs(Store& store, const Spec& spec) {
   };
   const auto check_input = [&](const std::optional<InputRef>& input, const std::string& pointer) {
     if (!input) return;
+    for (size_t i = 0; i < input->faces.size(); ++i)
+      check(input->faces[i], pointer + "/faces/" + kCubeFaceNames.at(i));
+    if (!input->faces.empty()) return;
     check(input->blob, input->resources.empty() ? pointer : pointer + "/blob");
     for (const auto& [uri, digest] : input->resources) {
       std::string escaped;  // RFC 6901, section 3

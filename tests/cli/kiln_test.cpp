@@ -403,6 +403,24 @@ TEST(Order, ReplacesPathsByDigestsAndBringsGltfFilesAlong) {
   EXPECT_EQ(parsed.spec.scene->resources[0].second, sha256_digest("buffer", 6));
 }
 
+TEST(Order, BringsTheSixFilesOfACubeAlong) {
+  test::TemporaryFolder folder;
+  std::string faces;
+  for (const char* face : {"px", "nx", "py", "ny", "pz", "nz"}) {
+    std::ofstream(folder.path() / (std::string(face) + ".exr")) << face;
+    faces += std::string(faces.empty() ? "" : ",") + "\"" + face + "\":\"" + face + ".exr\"";
+  }
+  std::ofstream(folder.path() / "order.json")
+      << R"({"kind":"environment_maps","inputs":{"environment":{"faces":{)" + faces +
+             R"(}}},"parameters":{"sh":{}}})";
+  const Order order = read_order(folder.path() / "order.json");
+  EXPECT_EQ(order.blobs.size(), 6u);
+  const ParsedSpec parsed = parse_spec(order.spec_json);
+  ASSERT_TRUE(parsed.faults.empty()) << parsed.faults[0].message;
+  ASSERT_EQ(parsed.spec.environment->faces.size(), 6u);
+  EXPECT_EQ(parsed.spec.environment->faces[2], sha256_digest("py", 2));
+}
+
 TEST(Order, RefusesGltfFilesOutsideItsFolder) {
   for (const char* uri : {"../secret", "/etc/passwd", "http://x/y.bin", "a/../../b",
                           "%2e%2e/secret", "..%2fsecret", "file:x", "a\\\\b", ""})

@@ -120,6 +120,33 @@ TEST(SpecJson, TakesAGltfWithItsResources) {
                    .empty());
 }
 
+TEST(SpecJson, TakesAnEnvironmentAsSixFaces) {
+  const auto order = [](const std::string& environment) {
+    return R"({"kind":"environment_maps","inputs":{"environment":)" + environment +
+           R"(},"parameters":{"sh":{}}})";
+  };
+  const std::string five =
+      "\"nz\":" + kB + ",\"pz\":" + kA + ",\"ny\":" + kA + ",\"py\":" + kA + ",\"nx\":" + kA;
+  const std::string six = order("{\"faces\":{" + five + ",\"px\":" + kA + "}}");
+  const auto parsed = parse_spec(six);
+  ASSERT_TRUE(parsed.faults.empty()) << parsed.faults[0].message;
+  ASSERT_EQ(parsed.spec.environment->faces.size(), 6u);
+  EXPECT_EQ("\"" + parsed.spec.environment->faces[5] + "\"", kB);
+  EXPECT_EQ(input_digests(parsed.spec).size(), 2u);
+  const std::string canonical = canonical_spec(parsed.spec);
+  EXPECT_EQ(canonical_spec(parse_spec(canonical).spec), canonical);
+
+  const auto told = [&](const std::string& environment) { return faults_of(order(environment)); };
+  EXPECT_EQ(told("{\"faces\":{" + five + "}}"), Told{"/inputs/environment/faces/px missing"});
+  EXPECT_EQ(told("{\"faces\":{" + five + ",\"px\":" + kA + ",\"up\":" + kA + "}}"),
+            Told{"/inputs/environment/faces/up unknown"});
+  EXPECT_EQ(told("{\"faces\":[]}"), Told{"/inputs/environment/faces type"});
+  EXPECT_EQ(told("{\"blob\":" + kA + ",\"faces\":{" + five + ",\"px\":" + kA + "}}"),
+            Told{"/inputs/environment/blob conflict"});
+  EXPECT_EQ(told("{\"blob\":" + kA + ",\"resources\":{}}"),
+            Told{"/inputs/environment/resources unknown"});
+}
+
 TEST(SpecCanonical, IsStableUnderOrderSpaceAndDefaults) {
   const std::string plain = ao("");
   const std::string spelled =
@@ -202,6 +229,10 @@ Spec random_spec() {
       spec.scene->resources = {{"a.bin", digest()}, {"b/c.png", digest()}};
   }
   if (spec.kind() == Kind::environment_maps) spec.environment = InputRef{digest(), {}};
+  if (spec.environment && *rc::gen::arbitrary<bool>()) {
+    spec.environment->blob.clear();
+    for (int face = 0; face < 6; ++face) spec.environment->faces.push_back(digest());
+  }
   if (*rc::gen::arbitrary<bool>()) spec.accuracy.target_error = *rc::gen::inRange(1, 1000) / 1000.0;
   if (spec.kind() != Kind::environment_maps) {
     spec.seed = *rc::gen::arbitrary<uint64_t>();
