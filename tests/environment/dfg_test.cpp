@@ -13,8 +13,8 @@
 namespace lightkiln {
 namespace {
 
-// A white surface under white light, F0 = 1: the twin's single scattering, an independent sum over
-// half vectors, times the compensation that a shader takes from the table, is 1.
+// X3: A white surface under white light, F0 = 1: the twin's single scattering, an independent sum
+// over half vectors, times the compensation that a shader takes from the table, is 1.
 TEST(Dfg, CompensatesAFurnaceToOne) {
   Progress progress;
   const int size = 32;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
+#include "core/environment/brute_force.h"
 #include "core/image/decode.h"
 #include "core/sphere/direction_map.h"
 #include "core/sphere/solid_angle.h"
@@ -21,6 +22,7 @@ DecodedImage decoded(const Image& image, EnvmapAttribute envmap = EnvmapAttribut
   return result;
 }
 
+// E1
 TEST(Environment, CountsNanInfiniteAndNegativeByKind) {
   Image dirty = reference::test_sky(16, 10), clean = dirty;
   const float bad[] = {NAN, NAN, INFINITY, -INFINITY, -1.0f, -0.5f, -2.0f};
@@ -35,6 +37,24 @@ TEST(Environment, CountsNanInfiniteAndNegativeByKind) {
   EXPECT_EQ(a.radiance.pixels, b.radiance.pixels);
   EXPECT_EQ(a.mean, b.mean);
   EXPECT_TRUE(std::isfinite(a.mean.x));
+  // Positive control: left in the map, one such texel takes every coefficient along.
+  Environment poisoned = b;
+  *poisoned.radiance.at(3, 5) = NAN;
+  for (const int l : {0, 3}) {
+    EXPECT_TRUE(std::isfinite(projected_coefficient(b, l, 0).x));
+    EXPECT_FALSE(std::isfinite(projected_coefficient(poisoned, l, 0).x));
+  }
+}
+
+// E6: the closed form of a lit pole row is its cap.
+TEST(Environment, WeighsAPoleRowByItsCap) {
+  const int height = 16;
+  Image map(2 * height, height, 3);
+  std::fill_n(map.at(0, 0), 3 * 2 * height, 1e4f);
+  const double cap = 1e4 * (1 - std::cos(kPi / height)) / 2;
+  EXPECT_NEAR(make_environment(decoded(map)).mean.x / cap, 1, 1e-6);
+  // Positive control: the area that the sine at the row's centre gives.
+  EXPECT_GT(std::abs(1e4 * kPi / height * std::sin(kPi / (2 * height)) / 2 / cap - 1), 1e-3);
 }
 
 TEST(Environment, RefusesThemWithTheirCountsWhenStrict) {

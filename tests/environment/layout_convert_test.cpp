@@ -285,6 +285,19 @@ TEST(ConvertLayout, IsContinuousAcrossSeamsWhenEnlarged) {
       EXPECT_LT(worst, 0.02 * scale) << layout_name(from.kind) << " " << int(from.convention);
     }
   }
+  // Positive control: read within its own face alone, a cube jumps at the edge.
+  const MapLayout strip = make_layout(LayoutKind::cube_strip, 12);
+  const Image source = paint(strip, [](const Vec3d& d) {
+    return Vec3d{1 + std::sin(9 * d.x), 1, 1};
+  });
+  const auto in_own_face = [&](const Vec3d& d) {
+    const MapPlace place = layout_place(strip, d).value();
+    const int x = std::clamp(static_cast<int>(place.x), 0, 11);
+    return source.rgb(x, std::clamp(static_cast<int>(place.y), 0, 71)).x;
+  };
+  const float before = in_own_face(normalize(Vec3d{1 + 1e-6, 0.02, 1}));
+  const float after = in_own_face(normalize(Vec3d{1 - 1e-6, 0.02, 1}));
+  EXPECT_GT(std::abs(before - after), 0.1);
 }
 
 TEST(ConvertLayout, MovesTexelsBetweenCubeLayouts) {

@@ -82,7 +82,7 @@ TEST(NarrowLobe, EqualsBruteForceUnderASun) {
   }
 }
 
-// No roughness is too low: the level tends to the source texel, finite all the way.
+// X1: No roughness is too low: the level tends to the source texel, finite all the way.
 TEST(NarrowLobe, TendsToTheSource) {
   const Environment sky = environment_of(reference::test_sky(32, 100));
   const int size = 24;

@@ -67,6 +67,7 @@ TEST(GgxLobe, HasThePublishedBandResponses) {
   EXPECT_NEAR(narrow[128], 1.5e-4, 1e-5);
 }
 
+// X1
 TEST(GgxLobe, EqualsTheDistributionOfHalfVectors) {
   for (const double alpha : {1e-3, 0.002025, 0.1, 0.5, 0.97, 1.0}) {
     const GgxLobe lobe(alpha);
@@ -246,7 +247,7 @@ Steps steps_of(const Image& cube) {
   return steps;
 }
 
-// Neighbours across an edge differ no more than neighbours inside: filtering is by direction.
+// M5: Neighbours across an edge differ no more than neighbours inside: filtering is by direction.
 TEST(Prefilter, ShowsNoSeamAtCubeEdges) {
   const Environment environment = environment_of(reference::test_sky(64, 10));
   const int size = 16;

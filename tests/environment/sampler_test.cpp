@@ -188,6 +188,7 @@ TEST(Sampler, DrawsFromItsDensityOnEveryRealMap) {
   EXPECT_EQ(maps, 15);
 }
 
+// E5
 TEST(Sampler, StaysInsideOneHotTexel) {
   Image map(64, 32, 3);
   map.at(63, 0)[1] = 2;
@@ -208,7 +209,7 @@ TEST(Sampler, StaysInsideOneHotTexel) {
   EXPECT_EQ(sampler.pdf({0, -1, 0}), 0);
 }
 
-// u and v on the edges of [0, 1) at the poles: density and direction stay finite.
+// E6: u and v on the edges of [0, 1) at the poles: density and direction stay finite.
 TEST(Sampler, StaysFiniteAtThePoles) {
   Image map = map_of(16, 1);
   for (int x = 0; x < 32; ++x) std::fill_n(map.at(x, 0), 3, 1e4f);
@@ -224,6 +225,7 @@ TEST(Sampler, StaysFiniteAtThePoles) {
   EXPECT_TRUE(std::isfinite(sampler.pdf({0, 1, 0})) && sampler.pdf({0, 1, 0}) > 0);
 }
 
+// E4
 TEST(Sampler, IsUniformOnABlackMap) {
   const Environment environment = environment_of(map_of(8, 0));
   const EnvironmentSampler sampler(environment);
@@ -231,6 +233,12 @@ TEST(Sampler, IsUniformOnABlackMap) {
   EXPECT_NEAR(sampler.pdf({1, 0, 0}), 1 / (4 * kPi), 1e-8);
   EXPECT_EQ(sampler.sample(0.3f, 0.9f).radiance, Vec3{});
   EXPECT_GT(chi_square(sampler), 1e-4);
+  // Positive control: a single lit texel, however dim, is no black map.
+  Image dim = map_of(8, 0);
+  dim.at(3, 3)[2] = 1e-30f;
+  const Environment lit = environment_of(dim);
+  EXPECT_FALSE(EnvironmentSampler(lit).black());
+  EXPECT_EQ(EnvironmentSampler(lit).pdf({0, 1, 0}), 0);
 }
 
 TEST(Sampler, GivesAConstantMapTheUniformDensity) {
@@ -251,6 +259,7 @@ Image sun_before_many(int height) {
   return map;
 }
 
+// E8
 TEST(Sampler, KeepsDimTexelsBehindASun) {
   const Environment environment = environment_of(sun_before_many(1024));
   const EnvironmentSampler sampler(environment);

@@ -242,6 +242,7 @@ TEST(Sun, LeavesMapsWithoutOneAlone) {
   EXPECT_TRUE(extract_sun(rest, {}).found);
 }
 
+// E2
 TEST(Sun, KeepsTheEnergyOfEveryMapOfTheDataSet) {
   LIGHTKILN_NEEDS_DATA(data);
   const auto folder = data / "environments";

@@ -225,7 +225,7 @@ TEST(Exr, EqualPixelsGiveEqualBytes) {
     EXPECT_NE(text.find(part), std::string::npos) << part;
 }
 
-// The values around the largest half.
+// E3: The values around the largest half.
 TEST(Exr, FallsBackToFloatRatherThanOverflow) {
   for (const float top : {65504.0f, 65519.0f, 65520.0f, 1e6f}) {
     Image image = ramp(8, 8, 3);

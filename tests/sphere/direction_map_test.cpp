@@ -81,6 +81,7 @@ TEST(DirectionMap, TurnsTheOrientationLatLongIntoTheOrientationCube) {
   EXPECT_GT(orientation_error(latlong.image, cube.image, true), 0.04);
 }
 
+// M1
 TEST(SolidAngle, CubeFaceSumsToASixthOfTheSphere) {
   for (const int size : {1, 2, 64, 1024}) {
     double sum = 0;
@@ -112,6 +113,7 @@ TEST(SolidAngle, WouldCancelInFloat) {
   EXPECT_GT(worst, 0.05);
 }
 
+// M2
 TEST(SolidAngle, LatLongRowsSumToTheSphere) {
   for (const int height : {1, 16, 512, 4096}) {
     double sum = 0, midpoint = 0;
@@ -126,6 +128,7 @@ TEST(SolidAngle, LatLongRowsSumToTheSphere) {
   }
 }
 
+// M3
 TEST(SolidAngle, SmallSunDoesNotCancel) {
   const double sun = 0.2666 * kPi / 180;
   const double series = kPi * sun * sun * (1 - sun * sun / 12);  // the next term is 1e-12

@@ -177,7 +177,8 @@ TEST(HarmonicTransform, ProjectsOneHotTexelAsADelta) {
   }
 }
 
-// Rotating the map about +Y by k texels must equal rotating the coefficients: the seam is nothing.
+// E7: Rotating the map about +Y by k texels must equal rotating the coefficients: the seam is
+// nothing.
 TEST(HarmonicTransform, TurnsWithTheMapAcrossTheSeam) {
   const Image sky = reference::test_sky(32, 300.0);
   Image turned(64, 32, 3);

@@ -37,7 +37,7 @@ WindowedSh window(const ShRgb& sh, ShWindow kind, ShQuantity quantity = ShQuanti
   return window_sh(sh, kind, quantity, 1, progress);
 }
 
-// The unit delta's irradiance of three bands spans [-19/480, 17/16]; its mean is 1/4.
+// H3: The unit delta's irradiance of three bands spans [-19/480, 17/16]; its mean is 1/4.
 TEST(HarmonicWindow, KnowsHowADeltaRings) {
   const WindowedSh hann = window(delta(normalize(Vec3d{0.3, -0.5, 0.7}), 3), ShWindow::hann);
   EXPECT_NEAR(hann.report.before.luminance_min / 4, -19.0 / 480, 1e-9);

@@ -24,7 +24,7 @@ Vec3d random_direction(uint64_t key, uint32_t index) {
   return {r * std::cos(phi), r * std::sin(phi), z};
 }
 
-// A truth that any wrong sign, order or scale breaks: values printed for two directions.
+// H2: A truth that any wrong sign, order or scale breaks: values printed for two directions.
 TEST(Harmonics, KeepSignOrderAndScaleOfTheConvention) {
   const auto up = basis_at({0, 1, 0}, 3);
   EXPECT_NEAR(up[0], 0.5 / std::sqrt(kPi), 1e-15);
@@ -120,6 +120,7 @@ double worst_addition_error(int bands) {
   return worst;
 }
 
+// H1
 TEST(Harmonics, ObeyTheAdditionTheoremToTwoHundredBands) {
   EXPECT_LE(worst_addition_error(5), 1e-14);
   EXPECT_LE(worst_addition_error(201), 1e-12);
@@ -159,6 +160,7 @@ double gram_error(bool exact_weights) {
   return worst;
 }
 
+// H5
 TEST(Harmonics, AreOrthonormalOverExactTexels) {
   EXPECT_LE(gram_error(true), 3e-4);
   EXPECT_GT(gram_error(false), 1e-2);
@@ -214,7 +216,7 @@ TEST(Harmonics, GiveTheHemisphereSkyExactIrradiance) {
   }
 }
 
-// Rotation: a delta goes where its direction goes, bands keep their energy, and back is back.
+// H4: Rotation: a delta goes where its direction goes, bands keep their energy, and back is back.
 TEST(Harmonics, RotateADeltaToItsRotatedDirection) {
   constexpr int kBands = 33;
   const Basis<double> frame = make_basis(normalize(Vec3d{0.3, -0.8, 0.52}));

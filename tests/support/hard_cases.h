@@ -28,8 +28,28 @@
 //   G11  rays that are not finite, or of no direction
 //   G13  faces given twice weigh twice
 // Environment maps
+//   E1   one pixel that is no number spoils every result
+//   E2   a sun is clamped away, or shows as fireflies
+//   E3   values above what half floats hold become infinite
+//   E4   a black map divides by its total
+//   E5   maps of one texel, or of one lit texel, fall between table entries
+//   E6   densities and weights that divide by zero at the poles
+//   E7   the left and the right border tear apart
+//   E8   a sum in float drops dim texels behind a sun
+//   M1   solid angles of cube texels cancel in float
+//   M2   solid angles of lat-long rows taken at their middle
+//   M3   the solid angle of a small disk cancels in float
 //   M4   a mirror ball is of equal area, and its whole rim one direction
 //   M5   filters that stop at the faces of a cube show lines
+// Reflection and harmonics
+//   X1   narrow lobes overflow at their peak or cancel beside it
+//   X2   directions behind the surface, and grazing ones
+//   X3   rough metals lose what bounces twice between their facets
+//   H1   factorials overflow at high bands
+//   H2   two sign conventions are in print
+//   H3   truncated harmonics ring below zero
+//   H4   rotations lose or move energy
+//   H5   sums over texels that are not orthonormal
 // Sums and repeatability
 //   R1   a running sum of floats stops growing
 //   R2   variance as a difference of squares cancels
