@@ -16,57 +16,80 @@ Kind read_kind_name(const std::string& name) {
   throw Error(ErrorCode::internal, "The plan is of an unknown kind \"" + name + "\".");
 }
 
-void write_counters(JsonWriter& writer, const RayCounters& counters) {
-  writer.begin_object()
-      .member("occlusion_rays", counters.occlusion_rays)
-      .member("nearest_rays", counters.nearest_rays)
-      .member("shadow_rays", counters.shadow_rays)
-      .member("bounce_rays", counters.bounce_rays)
-      .member("rejected_rays", counters.rejected_rays)
-      .member("filter_calls", counters.filter_calls)
-      .member("texture_reads", counters.texture_reads)
-      .member("environment_reads", counters.environment_reads)
-      .end_object();
+// A list of members serves both directions: the writer's and the reader's.
+template <typename T, typename Members>
+void write_members(JsonWriter& writer, const T& message, const Members& members) {
+  members(message, [&](const char* name, const auto& value) { writer.member(name, value); });
 }
 
-RayCounters read_counters(const JsonView& view) {
-  RayCounters counters;
-  counters.occlusion_rays = view.count("occlusion_rays");
-  counters.nearest_rays = view.count("nearest_rays");
-  counters.shadow_rays = view.count("shadow_rays");
-  counters.bounce_rays = view.count("bounce_rays");
-  counters.rejected_rays = view.count("rejected_rays");
-  counters.filter_calls = view.count("filter_calls");
-  counters.texture_reads = view.count("texture_reads");
-  counters.environment_reads = view.count("environment_reads");
-  return counters;
+struct MemberReader {
+  const JsonView& view;
+
+  void operator()(const char* name, uint64_t& value) const { value = view.count(name); }
+  void operator()(const char* name, double& value) const { value = view.number(name); }
+  void operator()(const char* name, bool& value) const { value = view.boolean(name); }
+  void operator()(const char* name, std::string& value) const { value = view.text(name); }
+};
+template <typename T, typename Members>
+T read_members(const JsonView& view, const Members& members) {
+  T message;
+  members(message, MemberReader{view});
+  return message;
 }
+
+constexpr auto kCounterMembers = [](auto& counters, const auto& visit) {
+  visit("occlusion_rays", counters.occlusion_rays);
+  visit("nearest_rays", counters.nearest_rays);
+  visit("shadow_rays", counters.shadow_rays);
+  visit("bounce_rays", counters.bounce_rays);
+  visit("rejected_rays", counters.rejected_rays);
+  visit("filter_calls", counters.filter_calls);
+  visit("texture_reads", counters.texture_reads);
+  visit("environment_reads", counters.environment_reads);
+};
 
 // A chunk's round keeps the sum, so that sums over chunks are exact.
-void write_chunk_round(JsonWriter& writer, const Round& round) {
-  writer.begin_object()
-      .member("samples", round.samples)
-      .member("rays", round.rays)
-      .member("elements", round.elements)
-      .member("cpu_s", round.cpu_s)
-      .member("wall_s", round.wall_s)
-      .member("error_sum_sq", round.error_sum_sq)
-      .member("error_max", round.error_max)
-      .member("converged", round.converged)
-      .end_object();
-}
+constexpr auto kChunkRoundMembers = [](auto& round, const auto& visit) {
+  visit("samples", round.samples);
+  visit("rays", round.rays);
+  visit("elements", round.elements);
+  visit("cpu_s", round.cpu_s);
+  visit("wall_s", round.wall_s);
+  visit("error_sum_sq", round.error_sum_sq);
+  visit("error_max", round.error_max);
+  visit("converged", round.converged);
+};
 
-Round read_chunk_round(const JsonView& view) {
-  Round round;
-  round.samples = view.count("samples");
-  round.rays = view.count("rays");
-  round.elements = view.count("elements");
-  round.cpu_s = view.number("cpu_s");
-  round.wall_s = view.number("wall_s");
-  round.error_sum_sq = view.number("error_sum_sq");
-  round.error_max = view.number("error_max");
-  round.converged = view.count("converged");
-  return round;
+constexpr auto kPriceMembers = [](auto& price, const auto& visit) {
+  visit("error", price.error);
+  visit("samples", price.samples);
+  visit("seconds", price.seconds);
+  visit("extrapolated", price.extrapolated);
+};
+
+constexpr auto kEffectMembers = [](auto& effect, const auto& visit) {
+  visit("effect", effect.name);
+  visit("active", effect.active);
+  visit("reason", effect.reason);
+  visit("bound", effect.bound);
+};
+
+template <typename T, typename Members>
+void write_list(JsonWriter& writer, const std::vector<T>& list, const Members& members) {
+  writer.begin_array();
+  for (const T& message : list) {
+    writer.begin_object();
+    write_members(writer, message, members);
+    writer.end_object();
+  }
+  writer.end_array();
+}
+template <typename T, typename Members>
+std::vector<T> read_list(const JsonView& view, const Members& members) {
+  std::vector<T> list;
+  for (const JsonValue& item : view.items())
+    list.push_back(read_members<T>(view.view(item), members));
+  return list;
 }
 
 }  // namespace
@@ -89,15 +112,7 @@ void write_rounds(JsonWriter& writer, const std::vector<Round>& rounds, uint64_t
 }
 
 void write_prices(JsonWriter& writer, const std::vector<Price>& prices) {
-  writer.begin_array();
-  for (const Price& price : prices)
-    writer.begin_object()
-        .member("error", price.error)
-        .member("samples", price.samples)
-        .member("seconds", price.seconds)
-        .member("extrapolated", price.extrapolated)
-        .end_object();
-  writer.end_array();
+  write_list(writer, prices, kPriceMembers);
 }
 
 std::string write_plan(const Plan& plan) {
@@ -106,16 +121,9 @@ std::string write_plan(const Plan& plan) {
       .member("kind", kind_name(plan.kind))
       .member("engine_version", plan.engine_version)
       .member("isa", plan.isa)
-      .key("effects")
-      .begin_array();
-  for (const Effect& effect : plan.effects)
-    writer.begin_object()
-        .member("effect", effect.name)
-        .member("active", effect.active)
-        .member("reason", effect.reason)
-        .member("bound", effect.bound)
-        .end_object();
-  writer.end_array().member("warnings", plan.warnings).key("repairs").begin_array();
+      .key("effects");
+  write_list(writer, plan.effects, kEffectMembers);
+  writer.member("warnings", plan.warnings).key("repairs").begin_array();
   for (const auto& [what, count] : plan.repairs)
     writer.begin_object().member("what", what).member("count", count).end_object();
   writer.end_array()
@@ -149,11 +157,7 @@ Plan read_plan(std::string_view json) {
   plan.kind = read_kind_name(view.text("kind"));
   plan.engine_version = view.text("engine_version");
   plan.isa = view.text("isa");
-  for (const JsonValue& item : view.at("effects").items()) {
-    const JsonView effect = view.view(item);
-    plan.effects.push_back({effect.text("effect"), effect.boolean("active"), effect.text("reason"),
-                            effect.number("bound")});
-  }
+  plan.effects = read_list<Effect>(view.at("effects"), kEffectMembers);
   for (const JsonValue& item : view.at("warnings").items())
     plan.warnings.push_back(view.view(item).text());
   for (const JsonValue& item : view.at("repairs").items())
@@ -166,11 +170,7 @@ Plan read_plan(std::string_view json) {
   plan.max_samples = view.count("max_samples");
   plan.max_bounces = view.integer("max_bounces");
   plan.reference_luminance = view.number("reference_luminance");
-  for (const JsonValue& item : view.at("prices").items()) {
-    const JsonView price = view.view(item);
-    plan.prices.push_back({price.number("error"), price.count("samples"), price.number("seconds"),
-                           price.boolean("extrapolated")});
-  }
+  plan.prices = read_list<Price>(view.at("prices"), kPriceMembers);
   plan.bias_bound = view.number("bias_bound");
   plan.predicted_s = view.number("predicted_s");
   plan.predicted_low_s = view.number("predicted_low_s");
@@ -181,11 +181,12 @@ Plan read_plan(std::string_view json) {
 
 std::string write_chunk_report(const ChunkReport& report) {
   JsonWriter writer;
-  writer.begin_object().member("elements", report.elements).key("rounds").begin_array();
-  for (const Round& round : report.rounds) write_chunk_round(writer, round);
-  writer.end_array().key("counters");
-  write_counters(writer, report.counters);
-  writer.member("cpu_s", report.cpu_s)
+  writer.begin_object().member("elements", report.elements).key("rounds");
+  write_list(writer, report.rounds, kChunkRoundMembers);
+  writer.key("counters").begin_object();
+  write_members(writer, report.counters, kCounterMembers);
+  writer.end_object()
+      .member("cpu_s", report.cpu_s)
       .member("wall_s", report.wall_s)
       .member("suspicious", report.suspicious)
       .member("budget_limited", report.budget_limited)
@@ -199,9 +200,8 @@ ChunkReport read_chunk_report(std::string_view json) {
   const JsonView view(value, ErrorCode::internal, what);
   ChunkReport report;
   report.elements = view.count("elements");
-  for (const JsonValue& item : view.at("rounds").items())
-    report.rounds.push_back(read_chunk_round(view.view(item)));
-  report.counters = read_counters(view.at("counters"));
+  report.rounds = read_list<Round>(view.at("rounds"), kChunkRoundMembers);
+  report.counters = read_members<RayCounters>(view.at("counters"), kCounterMembers);
   report.cpu_s = view.number("cpu_s");
   report.wall_s = view.number("wall_s");
   report.suspicious = view.count("suspicious");
@@ -229,9 +229,10 @@ std::string write_accuracy(const AccuracyRecord& record) {
       .member("elements", record.elements)
       .member("suspicious", record.suspicious)
       .member("budget_limited", record.budget_limited)
-      .key("counters");
-  write_counters(writer, record.counters);
-  writer.end_object();
+      .key("counters")
+      .begin_object();
+  write_members(writer, record.counters, kCounterMembers);
+  writer.end_object().end_object();
   return writer.take();
 }
 
