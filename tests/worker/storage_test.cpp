@@ -95,7 +95,8 @@ int wait_out_a_full_disk(const std::string& disk, const std::string& log) {
   const auto lines = [&] {
     std::ifstream in(log);
     size_t count = 0;
-    for (std::string line; std::getline(in, line);) ++count;
+    for (std::string line; std::getline(in, line);)
+      count += line.find("sandbox lacks") == std::string::npos;  // sanitizers rule layers out
     return count;
   };
   if (!eventually([&] { return lines() > 0; })) {  // the control: it meets the full disk
