@@ -10,6 +10,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/base/instruction_sets.h"
 #include "core/base/math.h"
 #include "core/environment/vector_math.h"
 #include "core/sphere/quadrature.h"
@@ -42,9 +43,9 @@ Rule make_rule(int points) {
 }
 
 // The sum over azimuths of (1 - h.z^2)^power, where h.z^2 = d2 / (2 (base + ring opening)).
-__attribute__((target_clones("avx512f", "avx2", "default"))) double sum_azimuths(
-    const double* opening, const double* weight, size_t count, double d2, double base, double ring,
-    double power, double* terms) {
+LIGHTKILN_CLONES double sum_azimuths(const double* opening, const double* weight, size_t count,
+                                     double d2, double base, double ring, double power,
+                                     double* terms) {
   for (size_t j = 0; j < count; ++j) {
     const double h2 = d2 / (2 * (base + ring * opening[j]));
     terms[j] = weight[j] * power_below_one(h2 < 1 ? 1 - h2 : 0.0, power);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/instruction_sets.h"
 #include "core/environment/vector_math.h"
 #include "core/sphere/quadrature.h"
 
@@ -38,9 +39,8 @@ double widest_extent(int points, double tolerance) {
 
 // Adds the core at 1 - cos(angle) = a + b x, times `weight` over the lobe's scale, for every point.
 // The same bits with any vector width.
-__attribute__((target_clones("avx512f", "avx2", "default"))) void add_core(
-    const GgxLobe& lobe, double split, double a, double b, double weight,
-    const std::vector<double>& points, std::vector<double>& values) {
+LIGHTKILN_CLONES void add_core(const GgxLobe& lobe, double split, double a, double b, double weight,
+                               const std::vector<double>& points, std::vector<double>& values) {
   const double narrow = lobe.narrow(), broad = lobe.broad();
   const double* x = points.data();
   double* out = values.data();
