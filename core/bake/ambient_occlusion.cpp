@@ -134,15 +134,18 @@ ChunkResult ao_chunk(AoState& state, const Plan& plan, const ElementRange& range
 namespace {
 
 // One value a vertex, row by row; the last row is filled up with zeros.
-Artifact strip_artifact(const std::string& name, std::span<const float> values, int width,
-                        int height, const std::string& meaning) {
+Image strip(std::span<const float> values, int width, int height) {
   Image image(width, height, 1);
   std::copy(values.begin(), values.end(), image.pixels.begin());
+  return image;
+}
+ExrWriteOptions strip_options(const std::string& meaning, int threads) {
   ExrWriteOptions options;
   options.pixel_type = ExrPixelType::float32;
   options.attributes["lightkiln:meaning"] = meaning;
   options.attributes["lightkiln:engine"] = kEngineVersion;
-  return {name, "image", "image/x-exr", write_exr(image, options)};
+  options.threads = threads;
+  return options;
 }
 
 AoMeshIndex mesh_index(const SurfaceMesh& mesh, uint64_t first, std::span<const float> openness,
@@ -253,11 +256,11 @@ Assembly ao_assemble(AoState& state, const Plan& plan, std::span<const ChunkResu
   if (!openness.empty()) {
     const int width = document.strip_width;
     const int height = document.strip_height;
-    assembly.artifacts.push_back(strip_artifact("ambient_occlusion.exr", openness, width, height,
-                                                "openness, one pixel a vertex"));
-    assembly.artifacts.push_back(strip_artifact("ambient_occlusion_error.exr", errors, width,
-                                                height,
-                                                "95 % half-width of openness, one pixel a vertex"));
+    const int threads = state.grants.threads;
+    add_image("ambient_occlusion.exr", strip(openness, width, height),
+              strip_options("openness, one pixel a vertex", threads), &assembly);
+    add_image("ambient_occlusion_error.exr", strip(errors, width, height),
+              strip_options("95 % half-width of openness, one pixel a vertex", threads), &assembly);
   }
   assembly.document = std::move(document);
   assembly.accuracy = summarise_accuracy(reports, target_error(state.spec), plan.predicted_s,

@@ -49,6 +49,14 @@ struct Artifact {
   std::vector<std::byte> bytes;
 };
 
+// What an image artifact looks like, for people: no side above kPictureSide.
+struct Picture {
+  std::string artifact;
+  Image pixels;
+};
+inline constexpr int kPictureSide = 512;     // texels
+inline constexpr size_t kMostPictures = 64;  // of a job: its first images, in order
+
 // Documents that the service writes as JSON; core knows no JSON.
 
 struct AoMeshIndex {
@@ -205,6 +213,7 @@ struct ProbesDocument {
 
 struct Assembly {
   std::vector<Artifact> artifacts;
+  std::vector<Picture> pictures;
   std::variant<AoDocument, EnvironmentDocument, ProbesDocument> document;
   AccuracyRecord accuracy;
 };

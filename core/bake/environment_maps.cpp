@@ -42,8 +42,6 @@ int bands_of(const MapsOutputs& outputs) {
 
 }  // namespace
 
-namespace {}  // namespace
-
 std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_maps_open(
     const Spec& spec, const Inputs& inputs, const Grants& grants) {
   const auto& parameters = std::get<EnvironmentMapsParameters>(spec.parameters);
@@ -350,8 +348,9 @@ AccuracyRecord record_of(const EnvironmentMapsState& state, const Plan& plan,
 
 Assembly environment_maps_assemble(EnvironmentMapsState& state, const Plan& plan,
                                    std::span<const ChunkResult> chunks, Progress& progress) {
-  Assembly assembly;
-  EnvironmentDocument document;
+  MapsResult result;
+  result.threads = state.grants.threads;
+  EnvironmentDocument& document = result.document;
   const Environment& environment = state.light.environment();
   document.source_width = environment.source_layout.width;
   document.source_height = environment.source_layout.height;
@@ -372,15 +371,15 @@ Assembly environment_maps_assemble(EnvironmentMapsState& state, const Plan& plan
     for (size_t i = 0; i < count; ++i) {
       progress.check();
       const MapsOutput& output = *state.outputs[static_cast<size_t>(range.first) + i];
-      output.file(reader, measured[i], &assembly, &document);
+      output.file(reader, measured[i], &result);
     }
     if (!reader.at_end()) {
       throw Error(ErrorCode::internal, "A chunk of environment maps holds more than its outputs.");
     }
   }
-  assembly.document = std::move(document);
-  assembly.accuracy = record_of(state, plan, chunks);
-  return assembly;
+  result.assembly.document = std::move(document);
+  result.assembly.accuracy = record_of(state, plan, chunks);
+  return std::move(result.assembly);
 }
 
 }  // namespace lightkiln

@@ -7,6 +7,7 @@
 
 #include "core/environment/cube_faces.h"
 #include "core/image/decode.h"
+#include "core/image/shrink.h"
 
 namespace lightkiln {
 
@@ -84,6 +85,27 @@ std::vector<ElementRange> split_chunks(uint64_t elements, double predicted_s, do
     chunks.push_back({first, elements * (i + 1) / count - first});
   }
   return chunks;
+}
+
+namespace {
+
+void add_exr(const std::string& name, const Image& image, std::vector<std::byte> bytes,
+             Assembly* assembly) {
+  assembly->artifacts.push_back({name, "image", "image/x-exr", std::move(bytes)});
+  if (assembly->pictures.size() < kMostPictures)
+    assembly->pictures.push_back({name, shrink(image, kPictureSide)});
+}
+
+}  // namespace
+
+void add_image(const std::string& name, const Image& image, const ExrWriteOptions& options,
+               Assembly* assembly) {
+  add_exr(name, image, write_exr(image, options), assembly);
+}
+
+void add_mip_mapped_image(const std::string& name, std::span<const Image> levels,
+                          const ExrWriteOptions& options, Assembly* assembly) {
+  add_exr(name, levels.front(), write_exr_mipmapped(levels, options), assembly);
 }
 
 static_assert(std::endian::native == std::endian::little,

@@ -5,6 +5,7 @@
 
 #include "core/bake/bake.h"
 #include "core/environment/environment.h"
+#include "core/image/exr.h"
 #include "core/scene/gltf.h"
 
 namespace lightkiln {
@@ -23,6 +24,13 @@ void add_scene_report(const SceneReport& report, Plan* plan);
 
 // Splits [0, elements) into equal chunks of about `seconds_each`, at least one.
 std::vector<ElementRange> split_chunks(uint64_t elements, double predicted_s, double seconds_each);
+
+// Adds an image as the OpenEXR artifact `name`, and its picture as long as there is room for more.
+// Levels go into one mip-mapped file, whose picture is that of level 0.
+void add_image(const std::string& name, const Image& image, const ExrWriteOptions& options,
+               Assembly* assembly);
+void add_mip_mapped_image(const std::string& name, std::span<const Image> levels,
+                          const ExrWriteOptions& options, Assembly* assembly);
 
 // One pointer-free serialisation for chunk bytes: little-endian, in call order.
 class ByteWriter {

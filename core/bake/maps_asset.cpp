@@ -87,29 +87,28 @@ class AssetLevel : public ConvolvedCube {
     return constant() ? MeasuredError{} : check(light, cube, check_texels, progress);
   }
 
-  void file(ByteReader& reader, const MeasuredError& measured, Assembly* assembly,
-            EnvironmentDocument* document) const override {
+  void file(ByteReader& reader, const MeasuredError& measured, MapsResult* result) const override {
     if (index_ == 0) {
       *asset_ = {};
       asset_->name = "environment";
       asset_->size = size();
       for (Vec3d& c : asset_->irradiance_coefficients)
         for (int channel = 0; channel < 3; ++channel) c[channel] = reader.f64();
-      document->asset.emplace();
+      result->document.asset.emplace();
     }
     auto& faces = asset_->specular_images.emplace_back();
     for (auto& face : faces) face = reader.sized();
     AssetLevelDocument level{size(), roughness_, error_bound(), measured};
-    const double mean = luminance(document->mean);
+    const double mean = luminance(result->document.mean);
     const double unit = mean > 0 ? mean : 1;
     level.packing_rms = reader.f64() / unit;
     level.packing_max = reader.f64() / unit;
     level.cut_texels = reader.u64();
     level.cut_share = reader.f64();
-    document->asset->levels.push_back(level);
+    result->document.asset->levels.push_back(level);
     if (index_ + 1 < levels_) return;
-    document->asset->artifact = "environment.glb";
-    assembly->artifacts.push_back(
+    result->document.asset->artifact = "environment.glb";
+    result->assembly.artifacts.push_back(
         {"environment.glb", "glb", "model/gltf-binary",
          write_gltf_image_light(*asset_, "Lightkiln " LIGHTKILN_VERSION)});
   }

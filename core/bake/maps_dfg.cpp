@@ -51,8 +51,7 @@ class DfgTable : public MapsOutput {
     return meter.result();
   }
 
-  void file(ByteReader& reader, const MeasuredError& measured, Assembly* assembly,
-            EnvironmentDocument* document) const override {
+  void file(ByteReader& reader, const MeasuredError& measured, MapsResult* result) const override {
     Image table(size_, size_, 3);
     reader.floats(table.pixels);
     ExrWriteOptions options;
@@ -60,10 +59,11 @@ class DfgTable : public MapsOutput {
     options.attributes["lightkiln.axes"] =
         "column: n.v = (x + 1/2)/size; row: roughness = (y + 1/2)/size from the top";
     options.attributes["lightkiln.channels"] = channels();
-    assembly->artifacts.push_back({"dfg.exr", "image", "image/x-exr", write_exr(table, options)});
-    document->dfg = DfgDocument{{"dfg.exr", size_, 0, error_bound(), measured},
-                                options_.multiple_scattering,
-                                options_.charlie};
+    options.threads = result->threads;
+    add_image("dfg.exr", table, options, &result->assembly);
+    result->document.dfg = DfgDocument{{"dfg.exr", size_, 0, error_bound(), measured},
+                                       options_.multiple_scattering,
+                                       options_.charlie};
   }
 
  private:

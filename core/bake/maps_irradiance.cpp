@@ -16,11 +16,9 @@ class IrradianceCube : public ConvolvedCube {
   IrradianceCube(MapsLight& light, int size, double target)
       : ConvolvedCube(light, size, Lobe{LobeKind::ggx, 1}, kPi, target) {}
 
-  void file(ByteReader& reader, const MeasuredError& measured, Assembly* assembly,
-            EnvironmentDocument* document) const override {
-    assembly->artifacts.push_back(
-        cube_artifact("irradiance.exr", read(reader), {{"lightkiln.quantity", kQuantity}}));
-    document->irradiance =
+  void file(ByteReader& reader, const MeasuredError& measured, MapsResult* result) const override {
+    add_cube("irradiance.exr", read(reader), {{"lightkiln.quantity", kQuantity}}, result);
+    result->document.irradiance =
         IrradianceDocument{{"irradiance.exr", size(), 0, error_bound(), measured}, {}};
   }
 };
@@ -88,15 +86,14 @@ class BandedIrradianceCube : public MapsOutput {
     return measured;
   }
 
-  void file(ByteReader& reader, const MeasuredError& measured, Assembly* assembly,
-            EnvironmentDocument* document) const override {
+  void file(ByteReader& reader, const MeasuredError& measured, MapsResult* result) const override {
     Image cube(size_, 6 * size_, 3);
     reader.floats(cube.pixels);
     const double rms = reader.f64(), most = reader.f64();
-    assembly->artifacts.push_back(cube_artifact(
-        "irradiance.exr", cube,
-        {{"lightkiln.quantity", kQuantity}, {"lightkiln.bands", std::to_string(bands_)}}));
-    document->irradiance = IrradianceDocument{
+    add_cube("irradiance.exr", cube,
+             {{"lightkiln.quantity", kQuantity}, {"lightkiln.bands", std::to_string(bands_)}},
+             result);
+    result->document.irradiance = IrradianceDocument{
         {"irradiance.exr", size_, 0, error_bound(), measured}, bands_, rms, most};
   }
 

@@ -94,8 +94,7 @@ class LayoutImage : public MapsOutput {
     return {};
   }
 
-  void file(ByteReader& reader, const MeasuredError&, Assembly* assembly,
-            EnvironmentDocument* document) const override {
+  void file(ByteReader& reader, const MeasuredError&, MapsResult* result) const override {
     Image image(layout_.width, layout_.height, 3);
     reader.floats(image.pixels);
     LayoutDocument entry;
@@ -110,7 +109,7 @@ class LayoutImage : public MapsOutput {
         Image part(layout_.width, layout_.width, 3);
         std::copy_n(image.at(0, face * layout_.width), part.pixels.size(), part.pixels.begin());
         write(part, name, describe(layout_) + "; this file: face " + kFaceNames[size_t(face)],
-              EnvmapAttribute::none, assembly);
+              EnvmapAttribute::none, result);
         entry.artifacts.push_back(name);
       }
     } else {
@@ -119,10 +118,10 @@ class LayoutImage : public MapsOutput {
                                         : layout_.kind == LayoutKind::latlong
                                             ? EnvmapAttribute::latlong
                                             : EnvmapAttribute::cube;
-      write(image, stem + ".exr", describe(layout_), attribute, assembly);
+      write(image, stem + ".exr", describe(layout_), attribute, result);
       entry.artifacts.push_back(stem + ".exr");
     }
-    document->layouts.push_back(std::move(entry));
+    result->document.layouts.push_back(std::move(entry));
   }
 
  private:
@@ -140,7 +139,7 @@ class LayoutImage : public MapsOutput {
 
   // OpenEXR's attribute is written exactly where its texel centres are.
   void write(const Image& image, const std::string& name, const std::string& layout,
-             EnvmapAttribute attribute, Assembly* assembly) const {
+             EnvmapAttribute attribute, MapsResult* result) const {
     ExrWriteOptions options;
     options.pixel_type = ExrPixelType::float32;
     options.envmap = attribute;
@@ -150,7 +149,8 @@ class LayoutImage : public MapsOutput {
                                            : "openexr: texel centres at i/(N - 1)";
     options.attributes["lightkiln.covered_share"] =
         short_number(covered_solid_angle(layout_) / (4 * kPi));
-    assembly->artifacts.push_back({name, "image", "image/x-exr", write_exr(image, options)});
+    options.threads = result->threads;
+    add_image(name, image, options, &result->assembly);
   }
 
   size_t product_;

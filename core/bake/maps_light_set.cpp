@@ -76,8 +76,7 @@ class LightSet : public MapsOutput {
     return {IrradianceReference::kNormals, error.rms, error.max};
   }
 
-  void file(ByteReader& reader, const MeasuredError&, Assembly* assembly,
-            EnvironmentDocument* document) const override {
+  void file(ByteReader& reader, const MeasuredError&, MapsResult* result) const override {
     LightSetDocument set;
     set.artifact = kArtifact;
     set.error = read_error(reader);
@@ -92,10 +91,10 @@ class LightSet : public MapsOutput {
       written.push_back({"light " + std::to_string(i), light.direction, light.irradiance});
       set.lights.push_back(light);
     }
-    assembly->artifacts.push_back(
+    result->assembly.artifacts.push_back(
         {kArtifact, "lights", "model/gltf+json",
          write_gltf_lights(written, std::string("Lightkiln ") + kEngineVersion)});
-    document->light_set = std::move(set);
+    result->document.light_set = std::move(set);
   }
 
  private:

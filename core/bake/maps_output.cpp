@@ -94,7 +94,7 @@ namespace {
 
 // Half-texel centres are what engines sample. OpenEXR's `envmap` attribute would claim centres on
 // the borders and is therefore not written; these attributes say what the file is.
-ExrWriteOptions cube_options(std::map<std::string, std::string> attributes) {
+ExrWriteOptions cube_options(std::map<std::string, std::string> attributes, int threads) {
   ExrWriteOptions options;
   options.pixel_type = ExrPixelType::float32;
   options.attributes = std::move(attributes);
@@ -103,20 +103,21 @@ ExrWriteOptions cube_options(std::map<std::string, std::string> attributes) {
                              "them");
   options.attributes.emplace("lightkiln.texel_convention",
                              "half_texel: texel centres at (i + 1/2)/N of a face");
+  options.threads = threads;
   return options;
 }
 
 }  // namespace
 
-Artifact cube_artifact(const std::string& name, const Image& cube,
-                       std::map<std::string, std::string> attributes) {
-  return {name, "image", "image/x-exr", write_exr(cube, cube_options(std::move(attributes)))};
+void add_cube(const std::string& name, const Image& cube,
+              std::map<std::string, std::string> attributes, MapsResult* result) {
+  add_image(name, cube, cube_options(std::move(attributes), result->threads), &result->assembly);
 }
 
-Artifact mip_mapped_cube_artifact(const std::string& name, std::span<const Image> levels,
-                                  std::map<std::string, std::string> attributes) {
-  return {name, "image", "image/x-exr",
-          write_exr_mipmapped(levels, cube_options(std::move(attributes)))};
+void add_mip_mapped_cube(const std::string& name, std::span<const Image> levels,
+                         std::map<std::string, std::string> attributes, MapsResult* result) {
+  add_mip_mapped_image(name, levels, cube_options(std::move(attributes), result->threads),
+                       &result->assembly);
 }
 
 }  // namespace lightkiln

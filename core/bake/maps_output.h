@@ -19,6 +19,13 @@ struct SpectrumNeed {
   const LobePlan* lobe = nullptr;  // those of a convolution, as exact as its responses ask
 };
 
+// What outputs file what they made in.
+struct MapsResult {
+  Assembly assembly;
+  EnvironmentDocument document;  // becomes the assembly's
+  int threads = 1;               // to encode images on
+};
+
 class MapsOutput {
  public:
   virtual ~MapsOutput() = default;
@@ -39,8 +46,8 @@ class MapsOutput {
   virtual MeasuredError make(MapsLight& light, int check_texels, ByteWriter& writer,
                              Progress& progress) const = 0;
   // Reads what make() wrote and files it as artifacts and in the document.
-  virtual void file(ByteReader& reader, const MeasuredError& measured, Assembly* assembly,
-                    EnvironmentDocument* document) const = 0;
+  virtual void file(ByteReader& reader, const MeasuredError& measured,
+                    MapsResult* result) const = 0;
 };
 
 using MapsOutputs = std::vector<std::unique_ptr<MapsOutput>>;
@@ -99,12 +106,12 @@ class ErrorMeter {
 void judge_output(double bound, const MeasuredError& measured, double target, ChunkReport* report,
                   Round* round);
 
-// Artifacts that are cubes, as six faces in one strip, with text attributes saying so.
-Artifact cube_artifact(const std::string& name, const Image& cube,
-                       std::map<std::string, std::string> attributes);
+// Adds a cube as six faces in one strip, with text attributes saying so.
+void add_cube(const std::string& name, const Image& cube,
+              std::map<std::string, std::string> attributes, MapsResult* result);
 // All levels of a chain in one file.
-Artifact mip_mapped_cube_artifact(const std::string& name, std::span<const Image> levels,
-                                  std::map<std::string, std::string> attributes);
+void add_mip_mapped_cube(const std::string& name, std::span<const Image> levels,
+                         std::map<std::string, std::string> attributes, MapsResult* result);
 
 extern const MapsProduct kSunProduct;
 extern const MapsProduct kShProduct;

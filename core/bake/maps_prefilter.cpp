@@ -43,27 +43,26 @@ class ChainLevel : public ConvolvedCube {
         level_(level),
         roughness_(chain_->roughness[static_cast<size_t>(level)]) {}
 
-  void file(ByteReader& reader, const MeasuredError& measured, Assembly* assembly,
-            EnvironmentDocument* document) const override {
+  void file(ByteReader& reader, const MeasuredError& measured, MapsResult* result) const override {
     const bool mapped = chain_->order.packaging == Packaging::mip_mapped;
     std::string name = chain_->name();
     if (!mapped) name.append("_").append(std::to_string(level_));
     name.append(".exr");
     std::map<std::string, std::string> attributes = chain_->attributes();
     if (mapped) {
-      add_to_file(read(reader), name, attributes, assembly);
+      add_to_file(read(reader), name, attributes, result);
     } else {
       attributes["lightkiln.roughness"] = short_number(roughness_);
-      assembly->artifacts.push_back(cube_artifact(name, read(reader), attributes));
+      add_cube(name, read(reader), attributes, result);
     }
-    auto& levels = chain_->sheen() ? document->sheen : document->prefilter;
+    auto& levels = chain_->sheen() ? result->document.sheen : result->document.prefilter;
     levels.push_back({name, size(), roughness_, error_bound(), measured, level_});
   }
 
  private:
   // Levels are filed in their order; the last one completes the file.
   void add_to_file(Image image, const std::string& name,
-                   std::map<std::string, std::string> attributes, Assembly* assembly) const {
+                   std::map<std::string, std::string> attributes, MapsResult* result) const {
     chain_->pending.push_back(std::move(image));
     if (chain_->pending.size() < chain_->roughness.size()) return;
     std::string list;
@@ -72,8 +71,7 @@ class ChainLevel : public ConvolvedCube {
       list.append(short_number(r));
     }
     attributes["lightkiln.roughness"] = list;
-    assembly->artifacts.push_back(
-        mip_mapped_cube_artifact(name, std::exchange(chain_->pending, {}), attributes));
+    add_mip_mapped_cube(name, std::exchange(chain_->pending, {}), attributes, result);
   }
 
   std::shared_ptr<Chain> chain_;

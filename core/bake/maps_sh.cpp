@@ -101,8 +101,7 @@ class Coefficients : public MapsOutput {
     return check_coefficients(light, order_.bands, check_texels, progress);
   }
 
-  void file(ByteReader& reader, const MeasuredError& measured, Assembly*,
-            EnvironmentDocument* document) const override {
+  void file(ByteReader& reader, const MeasuredError& measured, MapsResult* result) const override {
     ShDocument sh;
     sh.sh = read_coefficients(order_.bands, reader);
     sh.selftest = make_selftest(sh.sh);
@@ -113,14 +112,15 @@ class Coefficients : public MapsOutput {
       report.quantity = order_.window_quantity;
       report.factors.resize(static_cast<size_t>(order_.bands));
       visit_report(report, [&](double& value) { value = reader.f64(); });
-      document->sh_window = std::move(report);
+      result->document.sh_window = std::move(report);
     }
-    if (order_.zh3) document->zh3 = make_zh3(read_coefficients(3, reader));
+    if (order_.zh3) result->document.zh3 = make_zh3(read_coefficients(3, reader));
     for (size_t i = 0; i < std::size(kShTargets); ++i) {
-      if (order_.exports >> i & 1) document->sh_exports.push_back(export_sh(sh.sh, kShTargets[i]));
+      if (order_.exports >> i & 1)
+        result->document.sh_exports.push_back(export_sh(sh.sh, kShTargets[i]));
     }
-    document->sh = std::move(sh);
-    document->sh_measured = measured;
+    result->document.sh = std::move(sh);
+    result->document.sh_measured = measured;
   }
 
  private:

@@ -46,8 +46,7 @@ class Spectrum : public MapsOutput {
     return check_coefficients(light, bands_, check_texels, progress);
   }
 
-  void file(ByteReader& reader, const MeasuredError& measured, Assembly*,
-            EnvironmentDocument* document) const override {
+  void file(ByteReader& reader, const MeasuredError& measured, MapsResult* result) const override {
     const Vec3d mean = read(reader), whole = read(reader);
     std::vector<Vec3d> energy(kMeasuredBands);
     for (Vec3d& v : energy) v = read(reader);
@@ -60,7 +59,7 @@ class Spectrum : public MapsOutput {
     }
     spectrum.error_bound = error_bound();
     spectrum.measured = measured;
-    document->spectrum = std::move(spectrum);
+    result->document.spectrum = std::move(spectrum);
   }
 
  private:

@@ -33,16 +33,15 @@ class Sun : public MapsOutput {
     return meter.result();
   }
 
-  void file(ByteReader&, const MeasuredError& measured, Assembly* assembly,
-            EnvironmentDocument* document) const override {
-    document->sun = sun_;
-    document->sun_measured = measured;
+  void file(ByteReader&, const MeasuredError& measured, MapsResult* result) const override {
+    result->document.sun = sun_;
+    result->document.sun_measured = measured;
     if (!sun_.found) return;
-    document->sun_sh = sun_harmonics(sun_.disk, bands_);
-    document->sun_artifact = "sun.gltf";
+    result->document.sun_sh = sun_harmonics(sun_.disk, bands_);
+    result->document.sun_artifact = "sun.gltf";
     const GltfDirectionalLight light{"sun", sun_.disk.direction, sun_.disk.irradiance()};
-    assembly->artifacts.push_back(
-        {document->sun_artifact, "lights", "model/gltf+json",
+    result->assembly.artifacts.push_back(
+        {result->document.sun_artifact, "lights", "model/gltf+json",
          write_gltf_lights({&light, 1}, std::string("Lightkiln ") + kEngineVersion)});
   }
 

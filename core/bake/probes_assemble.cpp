@@ -30,12 +30,13 @@ std::map<std::string, std::string> attributes(const Vec3d& position, const char*
           {"lightkiln.texel_convention", "half_texel"}};
 }
 
-Artifact image_artifact(std::string name, const Image& image, ExrPixelType type,
-                        std::map<std::string, std::string> words) {
+ExrWriteOptions options_of(ExrPixelType type, int threads,
+                           std::map<std::string, std::string> words) {
   ExrWriteOptions options;
   options.pixel_type = type;
   options.attributes = std::move(words);
-  return {std::move(name), "image", "image/x-exr", write_exr(image, options)};
+  options.threads = threads;
+  return options;
 }
 
 Image stacked_cube(int size, int channels, std::vector<float> pixels) {
@@ -84,15 +85,15 @@ Assembly probes_assemble(ProbesState& state, const Plan& plan, std::span<const C
       const Vec3d& position = parameters.positions.at(result.index);
       document.probes.push_back(describe(result, position));
       const ProbeDocument& described = document.probes.back();
-      assembly.artifacts.push_back(
-          image_artifact(described.radiance_artifact,
-                         stacked_cube(parameters.cubemap.size, 3, std::move(result.radiance)), type,
-                         attributes(position, "radiance")));
-      assembly.artifacts.push_back(image_artifact(
-          described.distance_artifact,
-          stacked_cube(parameters.cubemap.size, 1, std::move(result.distance)),
-          ExrPixelType::float32,
-          attributes(position, "distance to the nearest surface, world units; 0 = nothing hit")));
+      const int size = parameters.cubemap.size, threads = state.grants.threads;
+      add_image(described.radiance_artifact, stacked_cube(size, 3, std::move(result.radiance)),
+                options_of(type, threads, attributes(position, "radiance")), &assembly);
+      add_image(
+          described.distance_artifact, stacked_cube(size, 1, std::move(result.distance)),
+          options_of(ExrPixelType::float32, threads,
+                     attributes(position,
+                                "distance to the nearest surface, world units; 0 = nothing hit")),
+          &assembly);
       progress.update(static_cast<double>(document.probes.size()) /
                       static_cast<double>(plan.elements));
     }

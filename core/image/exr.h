@@ -20,6 +20,8 @@ struct ExrWriteOptions {
   EnvmapAttribute envmap = EnvmapAttribute::none;
   // Text attributes, written in key order. No time stamp: equal pixels give equal bytes.
   std::map<std::string, std::string> attributes;
+  // To compress on: 1 = the caller's own, 0 = one per processor. The bytes do not depend on it.
+  int threads = 1;
 };
 
 // Reads scan-line or tiled files (level 0) of any compression; of a multi-part file the first part
@@ -34,21 +36,23 @@ DecodedImage read_exr(std::span<const std::byte> bytes);
 // other file. Throws as read_exr.
 std::vector<Image> read_exr_levels(std::span<const std::byte> bytes);
 
-// Writes a single-part scan-line ZIP file with channels R, G, B (A) or Y, chromaticities of Rec.
-// 709. With `half`, a value that half cannot hold (above 65504) makes the whole file 32-bit float;
-// the result says which was written through `written` when it is not null.
+// Writes a single-part scan-line file with channels R, G, B (A) or Y, chromaticities of Rec. 709,
+// ZIP-compressed unless a sample of its rows shows that it would save less than a tenth. With
+// `half`, a value that half cannot hold (above 65504) makes the whole file 32-bit float; the result
+// says which was written through `written` when it is not null.
 std::vector<std::byte> write_exr(const Image& image, const ExrWriteOptions& options,
                                  ExrPixelType* written = nullptr);
 
 // Levels of a full mip-map of `width` x `height` pixels: floor(log2(longer side)) + 1.
 int exr_level_count(int width, int height);
 
-// Writes one tiled (64 x 64) mip-mapped ZIP file with levels rounded down, from a strip of cube
-// faces or any other chain: level i is max(1, W >> i) x max(1, H >> i) pixels. The format has all
-// levels down to 1 x 1: those below the last one given are filled with means of the one above, and
-// the attribute "lightkiln.levels" says how many were given. One pixel type holds for all levels:
-// a value in any of them that half cannot hold makes the whole file 32-bit float. Throws Error:
-// invalid_input when a level has another size or number of channels; too_large as write_exr.
+// Writes one tiled (64 x 64) mip-mapped file, compressed as write_exr does, with levels rounded
+// down, from a strip of cube faces or any other chain: level i is max(1, W >> i) x max(1, H >> i)
+// pixels. The format has all levels down to 1 x 1: those below the last one given are filled with
+// means of the one above, and the attribute "lightkiln.levels" says how many were given. One pixel
+// type holds for all levels: a value in any of them that half cannot hold makes the whole file
+// 32-bit float. Throws Error: invalid_input when a level has another size or number of channels;
+// too_large as write_exr.
 std::vector<std::byte> write_exr_mipmapped(std::span<const Image> levels,
                                            const ExrWriteOptions& options,
                                            ExrPixelType* written = nullptr);

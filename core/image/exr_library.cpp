@@ -1,7 +1,13 @@
 #include "core/image/exr_library.h"
 
+#include <algorithm>
+#include <mutex>
+#include <system_error>
+
 #include <ImfHeader.h>
 #include <ImfThreading.h>
+
+#include "core/base/parallel.h"
 
 namespace lightkiln {
 
@@ -32,6 +38,19 @@ void prepare_exr_library() {
     return true;
   }();
   static_cast<void>(prepared);
+}
+
+int exr_library_threads(int threads) {
+  const int wanted = granted_threads(threads);
+  if (wanted == 1) return 0;  // the library then starts nothing and hands nothing over
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  try {
+    if (Imf::globalThreadCount() < wanted) Imf::setGlobalThreadCount(wanted);
+  } catch (const std::system_error&) {
+    // The system has no more threads to give. Those that started do the work.
+  }
+  return std::min(wanted, Imf::globalThreadCount());
 }
 
 }  // namespace lightkiln

@@ -46,8 +46,13 @@ class ExrMemoryOutput : public Imf::OStream {
   uint64_t position_ = 0;
 };
 
-// Sets the library's process-wide limits and threads, once.
+// Sets the library's process-wide limits, once.
 void prepare_exr_library();
+
+// What the library is to be told, when it opens a file, so that it works on `threads` threads (1 =
+// the caller's own, 0 = one per processor), or on as many as the system lets start. Its threads are
+// the process's and stay.
+int exr_library_threads(int threads);
 
 // Runs the library; what it throws becomes Error{code} with `sentence` and the library's reason.
 template <typename F>

@@ -92,6 +92,7 @@ class Oven {
     grants.max_memory_bytes = reader.number();
     grants.chunk_seconds = reader.real();
     reader.end();
+    threads_ = grants.threads;
     bake_.emplace(spec_, inputs_, grants);
     channel_.send(FrameType::loaded, {});
   }
@@ -155,7 +156,7 @@ class Oven {
   void assemble() {
     Progress progress = make_progress();
     Assembly assembly = bake().assemble(plan(), chunks_, progress);
-    std::vector<Artifact> previews = make_previews(assembly.artifacts);
+    std::vector<Artifact> previews = make_previews(assembly.pictures, threads_, progress);
     const std::string accuracy = write_accuracy(assembly.accuracy);
     const auto add = [&](const std::string& name, const char* role, const std::string& json) {
       assembly.artifacts.push_back({name, role, "application/json", as_bytes(json)});
@@ -179,6 +180,7 @@ class Oven {
   std::vector<std::unique_ptr<Mapping>> mappings_;
   Inputs inputs_;
   Spec spec_;
+  int threads_ = 1;
   std::optional<Bake> bake_;
   std::optional<Plan> plan_;
   std::vector<ChunkResult> chunks_;

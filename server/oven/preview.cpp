@@ -1,49 +1,21 @@
 #include "server/oven/preview.h"
 
-#include <algorithm>
-
+#include "core/base/parallel.h"
 #include "core/image/decode.h"
 #include "core/image/ldr.h"
 
 namespace lightkiln {
 
-// Each small texel is the mean of the block of whole texels that falls to it. The scale is one
-// number for both sides, so that proportions stay.
-Image shrink(const Image& image, int max_side) {
-  const int longest = std::max(image.width, image.height);
-  if (longest <= max_side) return image;
-  const auto scaled = [&](int size) {
-    return std::max(1, static_cast<int>(static_cast<int64_t>(size) * max_side / longest));
-  };
-  Image small(scaled(image.width), scaled(image.height), image.channels);
-  for (int y = 0; y < small.height; ++y)
-    for (int x = 0; x < small.width; ++x) {
-      const auto first = [](int i, int from, int to) {
-        return static_cast<int>(static_cast<int64_t>(i) * from / to);
-      };
-      const int x0 = first(x, image.width, small.width);
-      const int x1 = std::max(x0 + 1, first(x + 1, image.width, small.width));
-      const int y0 = first(y, image.height, small.height);
-      const int y1 = std::max(y0 + 1, first(y + 1, image.height, small.height));
-      for (int c = 0; c < image.channels; ++c) {
-        double sum = 0;
-        for (int v = y0; v < y1; ++v)
-          for (int u = x0; u < x1; ++u) sum += image.at(u, v)[c];
-        small.at(x, y)[c] = static_cast<float>(sum / ((x1 - x0) * (y1 - y0)));
-      }
-    }
-  return small;
-}
-
-std::vector<Artifact> make_previews(const std::vector<Artifact>& artifacts) {
-  std::vector<Artifact> previews;
-  for (const Artifact& artifact : artifacts) {
-    if (artifact.media_type != "image/x-exr") continue;
-    if (previews.size() == kMaxPreviews) break;
-    const Image small = shrink(read_exr(artifact.bytes).image, kMaxPreviewSide);
-    previews.push_back(
-        {artifact.name + ".png", "preview", "image/png", write_png(tonemap(small, {}))});
-  }
+std::vector<Artifact> make_previews(std::span<const Picture> pictures, int threads,
+                                    Progress& progress) {
+  std::vector<Artifact> previews(pictures.size());
+  parallel_blocks(
+      pictures.size(), 1, threads, progress,
+      [&](size_t i, size_t) {
+        previews[i] = {pictures[i].artifact + ".png", "preview", "image/png",
+                       write_png(tonemap(pictures[i].pixels, {}))};
+      },
+      1, 1);
   return previews;
 }
 

@@ -2,19 +2,16 @@
 
 // Small pictures of a job's images, for people who look at a page.
 
+#include <span>
 #include <vector>
 
 #include "core/bake/bake.h"
 
 namespace lightkiln {
 
-inline constexpr int kMaxPreviewSide = 512;  // texels
-inline constexpr size_t kMaxPreviews = 64;   // of a job: its first images, in order
-
-// A PNG "<name>.png" with role "preview" for each of the first kMaxPreviews OpenEXR artifacts.
-std::vector<Artifact> make_previews(const std::vector<Artifact>& artifacts);
-
-// Box-filtered down so that no side exceeds `max_side`; never enlarged.
-Image shrink(const Image& image, int max_side);
+// A PNG "<name>.png" with role "preview" for each picture, in their order; made on `threads`
+// threads (0 = one per processor), on which the bytes do not depend.
+std::vector<Artifact> make_previews(std::span<const Picture> pictures, int threads,
+                                    Progress& progress);
 
 }  // namespace lightkiln

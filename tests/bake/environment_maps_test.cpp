@@ -7,6 +7,7 @@
 #include "core/bake/maps_output.h"
 #include "core/image/exr.h"
 #include "core/image/radiance_hdr.h"
+#include "core/image/shrink.h"
 #include "core/sphere/direction_map.h"
 #include "tests/reference/sphere_twins.h"
 #include "tests/support/data.h"
@@ -233,6 +234,35 @@ TEST(EnvironmentMaps, SaysWhenAnOrderCannotBeReached) {
   const Assembly result = bake(spec, exr_of(reference::test_sky(16, 1e4)));
   EXPECT_EQ(result.accuracy.status, AccuracyStatus::budget_limited);
   EXPECT_GT(result.accuracy.error_max, 1e-9);
+}
+
+TEST(EnvironmentMaps, GivesASmallPictureOfEachImage) {
+  EnvironmentMapsParameters parameters;
+  parameters.prefilter = PrefilterOutput{.size = 128, .levels = 3};
+  parameters.sheen = PrefilterOutput{.size = 16, .levels = 2, .packaging = Packaging::mip_mapped};
+  parameters.dfg = DfgOutput{.size = 16};
+  const Assembly result = bake(order(parameters), exr_of(reference::test_sky(24, 10)));
+  std::vector<std::string> images, shown;
+  for (const Artifact& artifact : result.artifacts) {
+    if (artifact.media_type == "image/x-exr") images.push_back(artifact.name);
+  }
+  for (const Picture& picture : result.pictures) {
+    shown.push_back(picture.artifact);
+    const Image whole = image_of(result, picture.artifact);
+    EXPECT_EQ(picture.pixels.pixels, shrink(whole, kPictureSide).pixels) << picture.artifact;
+    EXPECT_LE(picture.pixels.height, kPictureSide);
+  }
+  EXPECT_EQ(shown, images);
+  EXPECT_EQ(shown.size(), 5u);
+}
+
+TEST(EnvironmentMaps, GivesPicturesOfTheFirstImagesOnly) {
+  Assembly assembly;
+  const int all = static_cast<int>(kMostPictures) + 2;
+  for (int i = 0; i < all; ++i) add_image(std::to_string(i), Image(4, 2, 3), {}, &assembly);
+  EXPECT_EQ(assembly.artifacts.size(), kMostPictures + 2);
+  ASSERT_EQ(assembly.pictures.size(), kMostPictures);
+  EXPECT_EQ(assembly.pictures.back().artifact, std::to_string(kMostPictures - 1));
 }
 
 std::vector<std::vector<std::byte>> bytes_of(const Assembly& assembly) {
