@@ -65,42 +65,67 @@ Image ConvolvedCube::make_cube(MapsLight& light, Progress& progress) const {
   return cube;
 }
 
+CheckedTexels::CheckedTexels(int count, int face_size_) : face_size(face_size_) {
+  const size_t side = static_cast<size_t>(face_size);
+  for (int i = 0; i < count; ++i) {
+    const size_t index = check_index(i, 6 * side * side);
+    texels.push_back({static_cast<int>(index % side), static_cast<int>(index / side)});
+  }
+}
+
+std::vector<Vec3d> CheckedTexels::directions() const {
+  std::vector<Vec3d> all;
+  for (const auto& [x, line] : texels) {
+    all.push_back(cube_texel_direction(line / face_size, x, line % face_size, face_size));
+  }
+  return all;
+}
+
+MeasuredError CheckedTexels::compare(const Image& cube, std::span<const Vec3d> truths,
+                                     double factor, double scale) const {
+  ErrorMeter meter(scale);
+  for (size_t i = 0; i < texels.size(); ++i) {
+    meter.add(to_double(cube.rgb(texels[i].x, texels[i].line)), truths[i] * factor);
+  }
+  return meter.result();
+}
+
 namespace {
 
-// What a level ought to hold at a direction.
-Vec3d slow_average(const Environment& environment, const Lobe& lobe, const Vec3d& direction) {
-  if (lobe.kind == LobeKind::ggx)
-    return lobe_average(environment, GgxLobe(lobe.alpha), lobe.alpha, direction);
+std::vector<Vec3d> slow_averages(MapsLight& light, const Lobe& lobe,
+                                 std::span<const Vec3d> directions, Progress& progress) {
+  const Environment& environment = light.environment();
+  if (lobe.kind == LobeKind::ggx) {
+    return lobe_averages(environment, GgxLobe(lobe.alpha), {.core_rad = lobe.alpha}, directions,
+                         light.threads(), progress);
+  }
   // A ring about the horizon: nowhere does it change faster than there.
-  return lobe_average(environment, CharlieLobe(lobe.alpha), 0, direction, 16 * lobe.alpha);
+  return lobe_averages(environment, CharlieLobe(lobe.alpha), {.elsewhere_rad = 16 * lobe.alpha},
+                       directions, light.threads(), progress);
+}
+
+std::vector<Vec3d> slow_texels(MapsLight& light, const CheckedTexels& checked, Progress& progress) {
+  std::vector<Vec3d> truths(checked.texels.size());
+  const int size = checked.face_size;
+  parallel_blocks(
+      truths.size(), 1, light.threads(), progress,
+      [&](size_t i, size_t) {
+        const auto& [x, line] = checked.texels[i];
+        truths[i] = texel_average(light.environment(), line / size, x, line % size, size);
+      },
+      1, 1);
+  return truths;
 }
 
 }  // namespace
 
 MeasuredError ConvolvedCube::check(MapsLight& light, const Image& cube, int count,
                                    Progress& progress) const {
-  const size_t side = static_cast<size_t>(size_);
-  const auto texel = [&](size_t i) {
-    const size_t index = check_index(static_cast<int>(i), 6 * side * side);
-    return std::pair(static_cast<int>(index % side), static_cast<int>(index / side));
-  };
-  std::vector<Vec3d> truths(static_cast<size_t>(count));
-  parallel_blocks(
-      truths.size(), 1, light.threads(), progress,
-      [&](size_t i, size_t) {
-        const auto [x, y] = texel(i);
-        truths[i] = lobe_ ? slow_average(light.environment(), *lobe_,
-                                         cube_texel_direction(y / size_, x, y % size_, size_)) *
-                                scale_
-                          : texel_average(light.environment(), y / size_, x, y % size_, size_);
-      },
-      1, 1);
-  ErrorMeter meter(scale_ * luminance(light.environment().mean));
-  for (size_t i = 0; i < truths.size(); ++i) {
-    const auto [x, y] = texel(i);
-    meter.add(to_double(cube.rgb(x, y)), truths[i]);
-  }
-  return meter.result();
+  const CheckedTexels checked(count, size_);
+  const std::vector<Vec3d> truths =
+      lobe_ ? slow_averages(light, *lobe_, checked.directions(), progress)
+            : slow_texels(light, checked, progress);
+  return checked.compare(cube, truths, scale_, scale_ * luminance(light.environment().mean));
 }
 
 MeasuredError ConvolvedCube::make(MapsLight& light, int check_texels, ByteWriter& writer,

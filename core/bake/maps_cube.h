@@ -9,6 +9,22 @@
 
 namespace lightkiln {
 
+// The texels of a cube that are held against a twin.
+struct CheckedTexels {
+  struct Texel {
+    int x, line;  // of the strip of faces
+  };
+  CheckedTexels(int count, int face_size);
+  // Of the texels' middles.
+  std::vector<Vec3d> directions() const;
+  // Against `truths` times `factor`, relative to `scale`.
+  MeasuredError compare(const Image& cube, std::span<const Vec3d> truths, double factor,
+                        double scale) const;
+
+  int face_size;
+  std::vector<Texel> texels;
+};
+
 class ConvolvedCube : public MapsOutput {
  public:
   // `lobe` none: the map itself, resampled by area. `scale` multiplies the average (pi:

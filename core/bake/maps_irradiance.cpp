@@ -40,6 +40,9 @@ class BandedCosine {
     }
     return sum;
   }
+  void fill(std::span<const double> cosines, std::span<double> values) const {
+    std::transform(cosines.begin(), cosines.end(), values.begin(), *this);
+  }
 
  private:
   const std::vector<double>& responses_;
@@ -100,18 +103,11 @@ class BandedIrradianceCube : public MapsOutput {
  private:
   // Against the same bands, not against the whole.
   MeasuredError check(MapsLight& light, const Image& cube, int count, Progress& progress) const {
-    ErrorMeter meter(kPi * luminance(light.environment().mean));
-    const size_t side = static_cast<size_t>(size_);
-    for (int i = 0; i < count; ++i) {
-      progress.check();
-      const size_t index = check_index(i, 6 * side * side);
-      const int x = static_cast<int>(index % side), y = static_cast<int>(index / side);
-      const Vec3d direction = cube_texel_direction(y / size_, x, y % size_, size_);
-      const Vec3d truth = lobe_average(light.environment(), BandedCosine(plan_.responses), 0,
-                                       direction, 1.0 / bands_);
-      meter.add(to_double(cube.rgb(x, y)), truth * kPi);
-    }
-    return meter.result();
+    const CheckedTexels checked(count, size_);
+    const std::vector<Vec3d> truths = lobe_averages(
+        light.environment(), BandedCosine(plan_.responses), {.elsewhere_rad = 1.0 / bands_},
+        checked.directions(), light.threads(), progress);
+    return checked.compare(cube, truths, kPi, kPi * luminance(light.environment().mean));
   }
 
   int size_, bands_;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/bake/maps_cost.h"
+#include "core/base/parallel.h"
 #include "core/environment/brute_force.h"
 
 namespace lightkiln {
@@ -24,13 +25,23 @@ Vec3d coefficient_of(const LatlongSpectrum& spectrum, int l, int m) {
 MeasuredError check_coefficients(MapsLight& light, int bands, int count, Progress& progress) {
   if (light.constant()) return {};
   const LatlongSpectrum& spectrum = light.spectrum(progress);
-  ErrorMeter meter(length(coefficient_of(spectrum, 0, 0)));
-  for (int i = 0; i < count; ++i) {
-    progress.check();
-    const size_t index = check_index(i, sh_coefficient_count(bands));
+  const auto place = [&](size_t i) {
+    const size_t index = check_index(static_cast<int>(i), sh_coefficient_count(bands));
     const int l = static_cast<int>(std::sqrt(static_cast<double>(index)));
-    const int m = static_cast<int>(index) - l * l - l;
-    meter.add(coefficient_of(spectrum, l, m), projected_coefficient(light.environment(), l, m));
+    return std::pair(l, static_cast<int>(index) - l * l - l);
+  };
+  std::vector<Vec3d> truths(static_cast<size_t>(count));
+  parallel_blocks(
+      truths.size(), 1, light.threads(), progress,
+      [&](size_t i, size_t) {
+        const auto [l, m] = place(i);
+        truths[i] = projected_coefficient(light.environment(), l, m);
+      },
+      1, 1);
+  ErrorMeter meter(length(coefficient_of(spectrum, 0, 0)));
+  for (size_t i = 0; i < truths.size(); ++i) {
+    const auto [l, m] = place(i);
+    meter.add(coefficient_of(spectrum, l, m), truths[i]);
   }
   return meter.result();
 }

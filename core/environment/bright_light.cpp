@@ -1,6 +1,7 @@
 #include "core/environment/bright_light.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/sphere/direction_map.h"
@@ -12,14 +13,28 @@ namespace {
 // The angle between unit vectors with cosine c, to 2e-8: Abramowitz & Stegun 4.4.46,
 // acos(x) = sqrt(1 - x) poly(x), mirrored for negative x.
 double fast_acos(double c) {
-  const double x = std::min(std::abs(c), 1.0);
+  const double magnitude = std::abs(c), x = magnitude < 1 ? magnitude : 1;
   double p = -0.0012624911;
-  for (const double k : {0.0066700901, -0.0170881256, 0.0308918810, -0.0501743046, 0.0889789874,
-                         -0.2145988016, 1.5707963050}) {
-    p = p * x + k;
-  }
+  p = p * x + 0.0066700901;
+  p = p * x - 0.0170881256;
+  p = p * x + 0.0308918810;
+  p = p * x - 0.0501743046;
+  p = p * x + 0.0889789874;
+  p = p * x - 0.2145988016;
+  p = p * x + 1.5707963050;
   const double angle = std::sqrt(1 - x) * p;
   return c < 0 ? kPi - angle : angle;
+}
+
+// Angles between a direction and `count` others, times `scale`. The same bits with any vector
+// width.
+__attribute__((target_clones("avx512f", "avx2", "default"))) void find_places(
+    const Vec3d& direction, const double* x, const double* y, const double* z, double scale,
+    double* places, size_t count) {
+  for (size_t i = 0; i < count; ++i) {
+    const double cosine = x[i] * direction.x + y[i] * direction.y + z[i] * direction.z;
+    places[i] = fast_acos(cosine) * scale;
+  }
 }
 
 constexpr int kTableStepsPerBand = 32;
@@ -82,10 +97,11 @@ std::vector<double> cell_means(const std::vector<double>& table, double extent) 
 
 // A texel acts as a point on bands l while l times its extent is small; larger ones are cut into
 // this many a side, as long as the points stay few.
-constexpr double kMaxPoints = 384;
+constexpr int kMostPoints = 384;
+static_assert(kMaxBrightTexels <= kMostPoints);
 constexpr double kPointPhase = 0.2;
 int point_cuts(const LightStatistics& light, int bands) {
-  const double most = std::sqrt(kMaxPoints / static_cast<double>(light.bright.size()));
+  const double most = std::sqrt(kMostPoints / static_cast<double>(light.bright.size()));
   const double wanted = std::ceil(light.bright.front().extent_rad * bands / kPointPhase);
   return static_cast<int>(std::clamp(wanted, 1.0, std::max(1.0, std::floor(most))));
 }
@@ -108,8 +124,11 @@ CutLight::CutLight(const LightStatistics& light, const ZonalKernel& kernel,
       // A cell's centre of mass lies a little towards the equator.
       const double centre = middle + kPi * dv * dv / 12 * std::cos(kPi * middle) / sine;
       for (int i = 0; i < cuts; ++i) {
-        points_.push_back({latlong_direction(u + du * (i + 0.5 - 0.5 * cuts), centre),
-                           texel.energy * (sine / all)});
+        const Vec3d direction = latlong_direction(u + du * (i + 0.5 - 0.5 * cuts), centre);
+        x_.push_back(direction.x);
+        y_.push_back(direction.y);
+        z_.push_back(direction.z);
+        energy_.push_back(texel.energy * (sine / all));
       }
     }
   }
@@ -121,12 +140,13 @@ CutLight::CutLight(const LightStatistics& light, const ZonalKernel& kernel,
 
 Vec3d CutLight::at(const Vec3d& direction) const {
   const double scale = static_cast<double>(table_.size() - 2) / kPi;
+  std::array<double, kMostPoints> places;
+  find_places(direction, x_.data(), y_.data(), z_.data(), scale, places.data(), energy_.size());
   Vec3d sum;
-  for (const PointSource& point : points_) {
-    const double place = fast_acos(dot(point.direction, direction)) * scale;
-    const size_t index = static_cast<size_t>(place);
-    const double f = place - static_cast<double>(index);
-    sum += point.energy * (table_[index] * (1 - f) + table_[index + 1] * f);
+  for (size_t i = 0; i < energy_.size(); ++i) {
+    const size_t index = static_cast<size_t>(places[i]);
+    const double f = places[i] - static_cast<double>(index);
+    sum += energy_[i] * (table_[index] * (1 - f) + table_[index + 1] * f);
   }
   return sum;
 }

@@ -18,10 +18,8 @@ class CutLight {
   Vec3d at(const Vec3d& direction) const;
 
  private:
-  struct PointSource {
-    Vec3d direction, energy;
-  };
-  std::vector<PointSource> points_;
+  std::vector<double> x_, y_, z_;  // directions of the points
+  std::vector<Vec3d> energy_;
   std::vector<double> table_;  // by angle, in equal steps from 0 to pi, and one more
 };
 

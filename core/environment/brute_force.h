@@ -4,15 +4,20 @@
 // to bake with, and therefore what a few texels of each bake are held against.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <span>
 #include <vector>
 
+#include "core/base/parallel.h"
 #include "core/environment/environment.h"
-#include "core/sphere/solid_angle.h"
 
 namespace lightkiln {
 
 namespace brute_force {
+
+inline constexpr int kMostCells = 64;
 
 // The lobe's integral over the part of the sphere between two longitudes and two colatitudes, cut
 // into cells x cells, each by two Gauss points a side. Over a cell h wide a lobe of width w errs by
@@ -22,70 +27,105 @@ double integrate_lobe(const Lobe& lobe, const Vec3d& axis, double longitude_rad,
                       double colatitude_rad, double width_rad, double height_rad, int cells) {
   const double node = 0.5 / std::sqrt(3.0);
   const double width = width_rad / cells, height = height_rad / cells;
+  std::array<double, 2 * kMostCells> across;  // the axis' share along each meridian of points
+  for (int i = 0; i < 2 * cells; ++i) {
+    const double phi = longitude_rad + (i / 2 + 0.5 + (i % 2 ? node : -node)) * width;
+    across[static_cast<size_t>(i)] = axis.x * std::sin(phi) + axis.z * std::cos(phi);
+  }
   double sum = 0;
   for (int j = 0; j < 2 * cells; ++j) {
     const double theta = colatitude_rad + (j / 2 + 0.5 + (j % 2 ? node : -node)) * height;
     const double ring = std::sin(theta), y = std::cos(theta);
     for (int i = 0; i < 2 * cells; ++i) {
-      const double phi = longitude_rad + (i / 2 + 0.5 + (i % 2 ? node : -node)) * width;
-      const double cosine = axis.y * y + ring * (axis.x * std::sin(phi) + axis.z * std::cos(phi));
+      const double cosine = axis.y * y + ring * across[static_cast<size_t>(i)];
       sum += ring * lobe(std::clamp(cosine, -1.0, 1.0));
     }
   }
   return sum * width * height / 4;
 }
 
+// A row of the map, colour by colour.
+struct Row {
+  double colatitude_rad = 0;  // of its middle
+  double omega = 0;           // of a texel
+  std::vector<double> red, green, blue;
+  std::vector<uint8_t> bright;  // 1 where a texel's luminance lies above 20 times the mean
+};
+Row read_row(const Environment& environment, int y);
+
+// Longitudes of the columns' middles.
+struct Columns {
+  explicit Columns(int width);
+  std::vector<double> sine, cosine;
+};
+// Cosines of the angles between `axis` and the middles of a row's texels.
+void fill_cosines(const Columns& columns, const Vec3d& axis, double colatitude_rad,
+                  std::span<double> cosines);
+// The sum of the row's texels times `weights`, in an order of its own that any machine keeps.
+Vec3d weighted_sum(const Row& row, std::span<const double> weights);
+
 }  // namespace brute_force
 
-// The lobe's average of the map about `axis`. `width_rad` is the lobe's own width. Where a texel is
-// smaller than a fiftieth of the distance over which the lobe changes, its centre stands for it;
-// elsewhere, on the lobe's horizon and for bright texels the lobe is integrated. Lobe:
-// operator()(cosine), integrating to 1 over the sphere.
-// A lobe that changes over `everywhere_rad` away from its axis too is integrated over wherever
-// texels are not small against that.
+// Over which distances a lobe changes: about its axis, and away from it.
+struct LobeWidths {
+  double core_rad = 0;
+  double elsewhere_rad = 1e9;
+};
+
+// The lobe's averages of the map about each of `axes`. Where a texel is smaller than a fiftieth of
+// the distance over which the lobe changes, its middle stands for it; elsewhere, on the lobe's
+// horizon and for bright texels the lobe is integrated. Lobe: operator()(cosine) and the same side
+// by side, fill(cosines, values); integrating to 1 over the sphere. The same bits for any number of
+// threads.
 template <typename Lobe>
-Vec3d lobe_average(const Environment& environment, const Lobe& lobe, double width_rad,
-                   const Vec3d& axis, double everywhere_rad = 1e9) {
+std::vector<Vec3d> lobe_averages(const Environment& environment, const Lobe& lobe,
+                                 const LobeWidths& widths, std::span<const Vec3d> axes, int threads,
+                                 Progress& progress) {
+  if (axes.empty()) return {};
+  constexpr double kKinkCell = 0.002;
+  constexpr size_t kRows = 16;  // summed together
   const Image& map = environment.radiance;
   const double step = 2 * kPi / map.width, row_step = kPi / map.height;
   const double side = std::max(step, row_step);
-  constexpr double kKinkCell = 0.002;
-  const double reach = 50 * side < everywhere_rad ? 50 * side - width_rad : kPi;
+  const double reach = 50 * side < widths.elsewhere_rad ? 50 * side - widths.core_rad : kPi;
   const double near = reach > 0 ? std::cos(std::min(kPi, reach)) : 2;
-  const double bright = 20 * luminance(environment.mean);
-  std::vector<double> sine(static_cast<size_t>(map.width)), cosine(sine.size());
-  for (size_t x = 0; x < sine.size(); ++x) {
-    const double phi = kPi - (static_cast<double>(x) + 0.5) * step;
-    sine[x] = std::sin(phi);
-    cosine[x] = std::cos(phi);
-  }
-  Vec3d sum;
-  for (int y = 0; y < map.height; ++y) {
-    const double theta = (y + 0.5) * row_step, ring = std::sin(theta);
-    const double along = axis.y * std::cos(theta);
-    const double omega = latlong_texel_solid_angle(y, map.width, map.height);
-    for (int x = 0; x < map.width; ++x) {
-      const size_t column = static_cast<size_t>(x);
-      const double c =
-          std::clamp(along + ring * (axis.x * sine[column] + axis.z * cosine[column]), -1.0, 1.0);
-      double weight = omega;
-      if (std::abs(c) < side) {  // the lobe's horizon, a kink, crosses it
-        const int cells = std::clamp(static_cast<int>(std::ceil(side / kKinkCell)), 1, 64);
-        weight = brute_force::integrate_lobe(lobe, axis, kPi - (x + 1) * step, y * row_step, step,
-                                             row_step, cells);
-      } else if (c > near || luminance(to_double(map.rgb(x, y))) > bright) {
-        const double scale =
-            std::min(width_rad + std::max(0.0, std::acos(c) - side), everywhere_rad);
-        const int cells = std::clamp(static_cast<int>(std::ceil(8 * side / scale)), 1, 64);
-        weight = brute_force::integrate_lobe(lobe, axis, kPi - (x + 1) * step, y * row_step, step,
-                                             row_step, cells);
-      } else {
-        weight *= lobe(c);
-      }
-      sum += to_double(map.rgb(x, y)) * weight;
-    }
-  }
-  return sum;
+  const auto cells_of = [&](double cosine) {
+    // On the lobe's horizon, a kink crosses the texel.
+    if (std::abs(cosine) < side) return side / kKinkCell;
+    return 8 * side /
+           std::min(widths.core_rad + std::max(0.0, std::acos(cosine) - side),
+                    widths.elsewhere_rad);
+  };
+  const brute_force::Columns columns(map.width);
+  const size_t height = static_cast<size_t>(map.height), blocks = (height + kRows - 1) / kRows;
+  std::vector<Vec3d> sums(blocks * axes.size());
+  parallel_blocks(
+      height, kRows, threads, progress,
+      [&](size_t begin, size_t end) {
+        std::vector<double> cosines(columns.sine.size()), weights(cosines.size());
+        for (size_t y = begin; y < end; ++y) {
+          const brute_force::Row row = brute_force::read_row(environment, static_cast<int>(y));
+          for (size_t a = 0; a < axes.size(); ++a) {
+            brute_force::fill_cosines(columns, axes[a], row.colatitude_rad, cosines);
+            lobe.fill(cosines, weights);
+            for (size_t x = 0; x < weights.size(); ++x) {
+              weights[x] *= row.omega;
+              const double c = cosines[x];
+              if (!(std::abs(c) < side || c > near || row.bright[x])) continue;
+              const int cells =
+                  std::clamp(static_cast<int>(std::ceil(cells_of(c))), 1, brute_force::kMostCells);
+              weights[x] = brute_force::integrate_lobe(
+                  lobe, axes[a], kPi - (static_cast<double>(x) + 1) * step,
+                  static_cast<double>(y) * row_step, step, row_step, cells);
+            }
+            sums[begin / kRows * axes.size() + a] += brute_force::weighted_sum(row, weights);
+          }
+        }
+      },
+      1, 1);
+  std::vector<Vec3d> averages(axes.size());
+  for (size_t i = 0; i < sums.size(); ++i) averages[i % axes.size()] += sums[i];
+  return averages;
 }
 
 // A coefficient of the map in the frame of LatlongSpectrum: polar axis +Y, azimuth the longitude; m

@@ -2,6 +2,8 @@
 
 // The "Charlie" sheen lobe of Estevez & Kulla with normal, view and mirror direction in one.
 
+#include <span>
+
 #include "core/environment/lobe.h"
 
 namespace lightkiln {
@@ -14,6 +16,8 @@ class CharlieLobe final : public ZonalKernel {
   explicit CharlieLobe(double alpha);
 
   double operator()(double cosine) const;
+  // The same for each of `cosines`.
+  void fill(std::span<const double> cosines, std::span<double> values) const;
   double at_angle(double angle_rad) const override;
   double panel(double angle_rad) const override;
 

@@ -33,10 +33,32 @@ GgxLobe::GgxLobe(double alpha) : alpha_(alpha) {
   scale_ = 1 / (2 * kPi * integral);
 }
 
+namespace {
+
+double value_at(double cosine, double narrow, double broad, double scale) {
+  const double beside = 1 - cosine > 0 ? 1 - cosine : 0;
+  const double d = narrow + broad * beside;
+  const double value = scale * cosine / (d * d);
+  return cosine > 0 ? value : 0;
+}
+
+__attribute__((target_clones("avx512f", "avx2", "default"))) void fill_values(
+    const GgxLobe& lobe, std::span<const double> cosines, std::span<double> values) {
+  const double narrow = lobe.narrow(), broad = lobe.broad(), scale = lobe.scale();
+  const double* from = cosines.data();
+  double* to = values.data();
+  const size_t count = values.size();
+  for (size_t i = 0; i < count; ++i) to[i] = value_at(from[i], narrow, broad, scale);
+}
+
+}  // namespace
+
 double GgxLobe::operator()(double cosine) const {
-  if (cosine <= 0) return 0;
-  const double d = narrow_ + broad_ * std::max(0.0, 1 - cosine);
-  return scale_ * cosine / (d * d);
+  return value_at(cosine, narrow_, broad_, scale_);
+}
+
+void GgxLobe::fill(std::span<const double> cosines, std::span<double> values) const {
+  fill_values(*this, cosines, values);
 }
 
 double GgxLobe::at_angle(double angle_rad) const {

@@ -6,8 +6,10 @@
 #include <ImfFrameBuffer.h>
 #include <ImfInputPart.h>
 #include <ImfMultiPartInputFile.h>
+#include <ImfOutputFile.h>
 #include <ImfRgbaFile.h>
 #include <ImfTiledInputPart.h>
+#include <ImfVersion.h>
 
 #include "core/base/error.h"
 #include "core/image/exr.h"
@@ -71,6 +73,20 @@ Image read_channels(Imf::MultiPartInputFile& file, const ExrPart& choice) {
   });
 }
 
+// The part as a file of its own, its blocks as they are, packed: the library restores chroma in
+// files of one part only.
+std::vector<std::byte> extract_part(Imf::MultiPartInputFile& file, int number) {
+  Imf::InputPart part(file, number);
+  Imf::Header header = part.header();
+  for (const char* of_parts : {"name", "type", "view", "chunkCount"}) header.erase(of_parts);
+  ExrMemoryOutput stream;
+  {
+    Imf::OutputFile alone(stream, header, 0);
+    alone.copyPixels(part);
+  }  // the offset table is written when the file closes
+  return std::move(stream.bytes);
+}
+
 // Luminance/chroma files hold Y at every pixel and RY = (R - Y) / Y, BY = (B - Y) / Y at every
 // second one. The library's own reconstruction filter restores them, in 16-bit floats.
 Image read_luminance_chroma(std::span<const std::byte> bytes, const Box2i& window) {
@@ -132,12 +148,10 @@ DecodedImage read_checked(std::span<const std::byte> bytes) {
   decoded.format = exr_format(header, open.part.colors);
   decoded.display = exr_display(header);
   if (open.part.colors == ExrColors::luminance_chroma) {
-    if (open.file.parts() > 1) {
-      throw Error(ErrorCode::unsupported,
-                  "The OpenEXR image is a multi-part file with luminance/chroma channels: store "
-                  "R, G and B instead.");
-    }
-    decoded.image = read_luminance_chroma(bytes, header.dataWindow());
+    const bool alone = !Imf::isMultiPart(open.file.version());
+    decoded.image = alone ? read_luminance_chroma(bytes, header.dataWindow())
+                          : read_luminance_chroma(extract_part(open.file, open.part.number),
+                                                  header.dataWindow());
   } else {
     decoded.image = read_channels(open.file, open.part);
   }

@@ -2,6 +2,7 @@
 
 // Maps and levels for tests of convolution.
 
+#include "core/environment/brute_force.h"
 #include "core/environment/prefilter.h"
 #include "core/image/decode.h"
 
@@ -28,6 +29,14 @@ inline Level convolve(const Environment& environment, const LobePlan& plan, int 
 }
 inline Level convolve(const Environment& environment, const Lobe& lobe, int size, double target) {
   return convolve(environment, plan_lobe(measure_light(environment), lobe, target), size);
+}
+
+// The slow twin at one direction.
+template <typename SlowLobe>
+Vec3d slow_average(const Environment& environment, const SlowLobe& lobe, const LobeWidths& widths,
+                   const Vec3d& axis) {
+  Progress progress;
+  return lobe_averages(environment, lobe, widths, {&axis, 1}, 1, progress)[0];
 }
 
 // Every texel of a map cut into factor x factor equal ones.

@@ -72,7 +72,9 @@ TEST(NarrowLobe, EqualsBruteForceUnderASun) {
     const Level level = convolve(sky, {LobeKind::ggx, alpha}, size, 1e-4);
     EXPECT_GT(level.plan.split, 0) << roughness;
     EXPECT_LE(level.plan.error_bound, 1e-4) << roughness;
-    const auto twin = [&](const Vec3d& d) { return lobe_average(sky, GgxLobe(alpha), alpha, d); };
+    const auto twin = [&](const Vec3d& d) {
+      return test::slow_average(sky, GgxLobe(alpha), {alpha}, d);
+    };
     // What the twin's own cells leave is 2e-5.
     EXPECT_LT(worst_relative(level, size, sun, 16, twin), 5e-5) << roughness;
     // Positive control: without its core the lobe misses most of the light.
@@ -146,7 +148,7 @@ TEST(Sheen, EqualsBruteForceUnderASun) {
     const double alpha = roughness * roughness;
     const Level level = convolve(sky, {LobeKind::charlie, alpha}, size, 1e-5);
     const auto twin = [&](const Vec3d& d) {
-      return lobe_average(sky, CharlieLobe(alpha), 0, d, alpha);
+      return test::slow_average(sky, CharlieLobe(alpha), {0, alpha}, d);
     };
     EXPECT_LT(worst_relative(level, size, beside, 16, twin), 1e-3) << roughness;
     for (const float v : level.cube.pixels) ASSERT_GE(v, 0);

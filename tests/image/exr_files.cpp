@@ -7,6 +7,8 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfInputPart.h>
+#include <ImfMultiPartInputFile.h>
 #include <ImfMultiPartOutputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfOutputPart.h>
@@ -185,11 +187,15 @@ std::vector<std::byte> make_exr(const Image& image, const ExrRecipe& recipe) {
   return bytes_of(stream);
 }
 
-std::vector<std::byte> make_luminance_chroma_exr(const Image& image) {
+std::vector<std::byte> make_luminance_chroma_exr(const Image& image, const ChromaRecipe& recipe) {
   Imf::StdOSStream stream;
+  ExrRecipe colors;
+  colors.compression = recipe.compression;
+  colors.window_x = recipe.window_x;
+  colors.window_y = recipe.window_y;
+  Imf::Header header = header_of(image, colors);
+  header.channels() = Imf::ChannelList();
   {
-    Imf::Header header(image.width, image.height);
-    header.compression() = Imf::PIZ_COMPRESSION;
     Imf::RgbaOutputFile file(stream, header, Imf::WRITE_YC, 0);
     file.setYCRounding(10, 10);  // all bits of a half, instead of 7 and 5
     std::vector<Imf::Rgba> pixels;
@@ -199,10 +205,38 @@ std::vector<std::byte> make_luminance_chroma_exr(const Image& image) {
         pixels.emplace_back(rgb.x, rgb.y, rgb.z);
       }
     }
-    file.setFrameBuffer(pixels.data(), 1, static_cast<size_t>(image.width));
+    const std::ptrdiff_t corner =
+        recipe.window_x + std::ptrdiff_t{recipe.window_y} * std::ptrdiff_t{image.width};
+    file.setFrameBuffer(pixels.data() - corner, 1, static_cast<size_t>(image.width));
     file.writePixels(image.height);
   }
-  return bytes_of(stream);
+  if (!recipe.second_part) return bytes_of(stream);
+
+  Imf::StdISStream alone;
+  alone.str(stream.str());
+  Imf::MultiPartInputFile single(alone, 0);
+  Imf::InputPart source(single, 0);
+  Imf::Header color = source.header();
+  color.setName("color");
+  color.setType(Imf::SCANLINEIMAGE);
+  Imf::Header depth(2 * image.width, 2 * image.height + 1);
+  depth.compression() = header.compression();
+  depth.channels().insert("Z", Imf::Channel(Imf::HALF));
+  depth.setName("depth");
+  depth.setType(Imf::SCANLINEIMAGE);
+  const Imf::Header headers[2] = {depth, color};
+  Imf::StdOSStream both;
+  {
+    Imf::MultiPartOutputFile file(both, headers, 2, true, 0);
+    const std::vector<Plane> z = {make_plane(
+        "Z", static_cast<size_t>(2 * image.width) * static_cast<size_t>(2 * image.height + 1),
+        ExrSamples::half, [](size_t) { return 999.0f; })};
+    Imf::OutputPart first(file, 0), second(file, 1);
+    first.setFrameBuffer(buffer_of(z, depth, ExrSamples::half));
+    first.writePixels(2 * image.height + 1);
+    second.copyPixels(source);
+  }
+  return bytes_of(both);
 }
 
 Image ramp(int width, int height, int channels) {

@@ -32,8 +32,16 @@ struct ExrRecipe {
 // Levels below the first of mip_map and rip_map are filled with 999.
 std::vector<std::byte> make_exr(const Image& image, const ExrRecipe& recipe);
 
-// Y, RY and BY in 16-bit float, PIZ.
-std::vector<std::byte> make_luminance_chroma_exr(const Image& image);
+struct ChromaRecipe {
+  std::string compression = "piz";
+  int window_x = 0, window_y = 0;  // the data window's corner; both even
+  // A first part with channel Z only, larger than the image, which stands in a second part.
+  bool second_part = false;
+};
+// Y, RY and BY in 16-bit float, RY and BY at every second pixel. Even sides. The same samples in
+// every packing that loses nothing.
+std::vector<std::byte> make_luminance_chroma_exr(const Image& image,
+                                                 const ChromaRecipe& recipe = {});
 
 // A smooth ramp with a different slope per channel, values from 0.25 to about 5.
 Image ramp(int width, int height, int channels);

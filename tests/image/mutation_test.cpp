@@ -75,7 +75,9 @@ RC_GTEST_PROP(Mutation, OpenExrDecodesOrIsRefused, ()) {
 }
 
 RC_GTEST_PROP(Mutation, LuminanceChromaDecodesOrIsRefused, ()) {
-  survives(test::make_luminance_chroma_exr(test::ramp(32, 24, 3)), read_hdr);
+  test::ChromaRecipe recipe;
+  recipe.second_part = *rc::gen::arbitrary<bool>();
+  survives(test::make_luminance_chroma_exr(test::ramp(32, 24, 3), recipe), read_hdr);
 }
 
 RC_GTEST_PROP(Mutation, RadianceDecodesOrIsRefused, ()) {
