@@ -10,6 +10,7 @@
 #include "core/environment/ggx_lobe.h"
 #include "core/environment/near_field.h"
 #include "core/sphere/direction_map.h"
+#include "core/sphere/solid_angle.h"
 #include "tests/environment/convolved.h"
 #include "tests/reference/sphere_twins.h"
 
