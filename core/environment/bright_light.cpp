@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/base/instruction_sets.h"
 #include "core/sphere/direction_map.h"
 
 namespace lightkiln {
@@ -28,9 +29,8 @@ double fast_acos(double c) {
 
 // Angles between a direction and `count` others, times `scale`. The same bits with any vector
 // width.
-__attribute__((target_clones("avx512f", "avx2", "default"))) void find_places(
-    const Vec3d& direction, const double* x, const double* y, const double* z, double scale,
-    double* places, size_t count) {
+LIGHTKILN_CLONES void find_places(const Vec3d& direction, const double* x, const double* y,
+                                  const double* z, double scale, double* places, size_t count) {
   for (size_t i = 0; i < count; ++i) {
     const double cosine = x[i] * direction.x + y[i] * direction.y + z[i] * direction.z;
     places[i] = fast_acos(cosine) * scale;

@@ -1,5 +1,6 @@
 #include "core/environment/brute_force.h"
 
+#include "core/base/instruction_sets.h"
 #include "core/sphere/direction_map.h"
 #include "core/sphere/quadrature.h"
 #include "core/sphere/solid_angle.h"
@@ -38,8 +39,8 @@ Columns::Columns(int width) : sine(static_cast<size_t>(width)), cosine(sine.size
   }
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void fill_cosines(
-    const Columns& columns, const Vec3d& axis, double colatitude_rad, std::span<double> cosines) {
+LIGHTKILN_CLONES void fill_cosines(const Columns& columns, const Vec3d& axis, double colatitude_rad,
+                                   std::span<double> cosines) {
   const double along = axis.y * std::cos(colatitude_rad), ring = std::sin(colatitude_rad);
   const double *sine = columns.sine.data(), *cosine = columns.cosine.data();
   double* out = cosines.data();
@@ -52,8 +53,7 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void fill_cosines(
 }
 
 // Eight partial sums of each colour, whatever the machine's vectors hold.
-__attribute__((target_clones("avx512f", "avx2", "default"))) Vec3d weighted_sum(
-    const Row& row, std::span<const double> weights) {
+LIGHTKILN_CLONES Vec3d weighted_sum(const Row& row, std::span<const double> weights) {
   constexpr size_t kLanes = 8;
   double sums[3][kLanes] = {};
   const double* colors[3] = {row.red.data(), row.green.data(), row.blue.data()};

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/base/instruction_sets.h"
 #include "core/base/parallel.h"
 #include "core/environment/charlie_albedo.h"
 #include "core/sphere/quadrature.h"
@@ -62,9 +63,7 @@ Rule make_rule(int azimuths, int radii) {
 //   d = (2k cos phi, 2k sin phi, 1 - k^2) / (1 + k^2),  dw = (2k / (1 + k^2)) (2 dk / (1 + k^2))
 //   dphi.
 // Radii stand side by side for vector code, which gives the same bits at any width.
-__attribute__((target_clones("avx512f", "avx2", "default"))) DfgValue integrate(double alpha,
-                                                                                double cosine,
-                                                                                const Rule& rule) {
+LIGHTKILN_CLONES DfgValue integrate(double alpha, double cosine, const Rule& rule) {
   const double a2 = alpha * alpha, sine = std::sqrt((1 - cosine) * (1 + cosine));
   const double norm = 1 / std::sqrt(a2 * sine * sine + cosine * cosine);
   const double w_x = alpha * sine * norm, w_z = cosine * norm;

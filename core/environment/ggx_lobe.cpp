@@ -7,6 +7,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "core/base/instruction_sets.h"
 #include "core/base/math.h"
 
 namespace lightkiln {
@@ -42,8 +43,8 @@ double value_at(double cosine, double narrow, double broad, double scale) {
   return cosine > 0 ? value : 0;
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void fill_values(
-    const GgxLobe& lobe, std::span<const double> cosines, std::span<double> values) {
+LIGHTKILN_CLONES void fill_values(const GgxLobe& lobe, std::span<const double> cosines,
+                                  std::span<double> values) {
   const double narrow = lobe.narrow(), broad = lobe.broad(), scale = lobe.scale();
   const double* from = cosines.data();
   double* to = values.data();
