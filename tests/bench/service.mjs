@@ -10,11 +10,12 @@ import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "no
 import { join } from "node:path";
 
 process.env.LIGHTKILN_BINARY_DIR ??= new URL("../../build/release", import.meta.url).pathname;
+const { doubledHdr } = await import("./doubled_hdr.mjs");
 const { finished, project, startDaemon, upload } = await import("../web/daemon.mjs");
 
 const data = process.env.LIGHTKILN_TEST_DATA ?? join(project, "..", "shared", "data");
 const median = (values) => values.toSorted((a, b) => a - b)[Math.floor(values.length / 2)];
-const say = (name, text) => console.log(`${name.padEnd(58)} ${text}`);
+const say = (name, text) => console.log(`${name.padEnd(62)} ${text}`);
 
 // One triangle as a .gltf with its buffer inside.
 function triangle() {
@@ -62,6 +63,40 @@ function readsPerSecond(url, path) {
   return `${Math.round(rate)} a second, p99 ${slowest}, ${refused} refused`;
 }
 
+// One order of the products that an engine needs of a map, on a daemon that knows the map and whose
+// oven waits. Every order asks for another error by a hair, so that the store answers none of them.
+async function measureWarmMaps(url) {
+  const source = join(data, "environments", "latlong_hdr", "kloppenheim_05_1k.hdr");
+  if (!existsSync(source)) {
+    say("chain + SH + irradiance + DFG of a 2k HDR", "left out: no shared/data folder beside the project");
+    return;
+  }
+  const path = join(folder, "2k.hdr");
+  writeFileSync(path, doubledHdr(readFileSync(source)));
+  const environment = await upload(url, path);
+  const parameters = { prefilter: {}, sh: {}, irradiance: {}, dfg: {} };
+  let order = 0;
+  for (const check_texels of [4, 0]) {
+    const runs = [];
+    for (let i = 0; i < 10; i += 1) {
+      const accuracy = { target_error: 0.001 + 1e-9 * (order += 1), check_texels };
+      const { job, seconds } = await bake(url, { kind: "environment_maps", inputs: { environment }, parameters, accuracy });
+      if (job.from_cache) throw new Error("the store answered");
+      const { items } = await (await fetch(`${url}/v1/jobs/${job.id}/events?limit=100`)).json();
+      const time = (stage) => Date.parse(items.find((event) => event.data.stage === stage).time);
+      const begin = Date.parse(job.started_at), end = Date.parse(job.finished_at);
+      const phases = [time("bake") - begin, time("assemble") - time("bake"), end - time("assemble")];
+      runs.push({ seconds, phases: phases.map((ms) => (ms / 1000).toFixed(2)).join(" + ") });
+    }
+    const [fastest, ...rest] = runs.slice(1).toSorted((a, b) => a.seconds - b.seconds);
+    say(
+      `chain + SH + irradiance + DFG of a 2k HDR, ${check_texels} texels checked`,
+      `${fastest.seconds.toFixed(2)} s at least (plan, bake, assemble: ${fastest.phases}), ` +
+        `${rest[3].seconds.toFixed(2)} s in the median of 9`,
+    );
+  }
+}
+
 const folder = mkdtempSync(join(tmpdir(), "lightkiln-bench-"));
 const daemon = await startDaemon();
 try {
@@ -76,6 +111,8 @@ try {
     warm.push((await bake(daemon.url, spec)).seconds);
   }
   say("AO of one triangle, submit to artifacts", `${Math.round(median(warm.slice(1)) * 1000)} ms (median of 8)`);
+
+  await measureWarmMaps(daemon.url);
 
   const idle = (await fetch(`${daemon.url}/v1/jobs?limit=1`)).json();
   const id = (await idle).items[0].id;
