@@ -1,5 +1,7 @@
 #include "core/environment/brute_force.h"
 
+#include <cstring>
+
 #include "core/base/instruction_sets.h"
 #include "core/sphere/direction_map.h"
 #include "core/sphere/quadrature.h"
@@ -49,6 +51,35 @@ LIGHTKILN_CLONES void fill_cosines(const Columns& columns, const Vec3d& axis, do
     const double c = along + ring * (axis.x * sine[x] + axis.z * cosine[x]);
     const double most = c < 1 ? c : 1;
     out[x] = most > -1 ? most : -1;
+  }
+}
+
+namespace {
+
+// 1 where the texel is an exception.
+LIGHTKILN_CLONES void mark(const double* cosines, const uint8_t* bright, double side, double near,
+                           uint8_t* marks, size_t count) {
+  for (size_t x = 0; x < count; ++x) {
+    const double c = cosines[x];
+    marks[x] = static_cast<uint8_t>((std::abs(c) < side) | (c > near) | bright[x]);
+  }
+}
+
+}  // namespace
+
+void find_exceptions(const Row& row, std::span<const double> cosines, double side, double near,
+                     std::vector<size_t>* columns) {
+  constexpr size_t kAtOnce = 64;
+  columns->clear();
+  for (size_t begin = 0; begin < cosines.size(); begin += kAtOnce) {
+    const size_t count = std::min(kAtOnce, cosines.size() - begin);
+    uint8_t marks[kAtOnce];
+    mark(&cosines[begin], &row.bright[begin], side, near, marks, count);
+    for (const uint8_t* at = marks; at < marks + count; ++at) {
+      at = static_cast<const uint8_t*>(std::memchr(at, 1, static_cast<size_t>(marks + count - at)));
+      if (at == nullptr) break;
+      columns->push_back(begin + static_cast<size_t>(at - marks));
+    }
   }
 }
 

@@ -61,6 +61,10 @@ struct Columns {
 // Cosines of the angles between `axis` and the middles of a row's texels.
 void fill_cosines(const Columns& columns, const Vec3d& axis, double colatitude_rad,
                   std::span<double> cosines);
+// The columns whose texel's middle cannot stand for it: on the lobe's horizon (cosines below
+// `side`), about its axis (above `near`), and where it is bright.
+void find_exceptions(const Row& row, std::span<const double> cosines, double side, double near,
+                     std::vector<size_t>* columns);
 // The sum of the row's texels times `weights`, in an order of its own that any machine keeps.
 Vec3d weighted_sum(const Row& row, std::span<const double> weights);
 
@@ -102,23 +106,24 @@ std::vector<Vec3d> lobe_averages(const Environment& environment, const Lobe& lob
   parallel_blocks(
       height, kRows, threads, progress,
       [&](size_t begin, size_t end) {
-        std::vector<double> cosines(columns.sine.size()), weights(cosines.size());
+        std::vector<double> cosines(columns.sine.size()), values(cosines.size());
+        std::vector<size_t> exceptions;
         for (size_t y = begin; y < end; ++y) {
           const brute_force::Row row = brute_force::read_row(environment, static_cast<int>(y));
           for (size_t a = 0; a < axes.size(); ++a) {
             brute_force::fill_cosines(columns, axes[a], row.colatitude_rad, cosines);
-            lobe.fill(cosines, weights);
-            for (size_t x = 0; x < weights.size(); ++x) {
-              weights[x] *= row.omega;
-              const double c = cosines[x];
-              if (!(std::abs(c) < side || c > near || row.bright[x])) continue;
-              const int cells =
-                  std::clamp(static_cast<int>(std::ceil(cells_of(c))), 1, brute_force::kMostCells);
-              weights[x] = brute_force::integrate_lobe(
-                  lobe, axes[a], kPi - (static_cast<double>(x) + 1) * step,
-                  static_cast<double>(y) * row_step, step, row_step, cells);
+            lobe.fill(cosines, values);
+            brute_force::find_exceptions(row, cosines, side, near, &exceptions);
+            for (const size_t x : exceptions) {
+              const int cells = std::clamp(static_cast<int>(std::ceil(cells_of(cosines[x]))), 1,
+                                           brute_force::kMostCells);
+              values[x] = brute_force::integrate_lobe(
+                              lobe, axes[a], kPi - (static_cast<double>(x) + 1) * step,
+                              static_cast<double>(y) * row_step, step, row_step, cells) /
+                          row.omega;
             }
-            sums[begin / kRows * axes.size() + a] += brute_force::weighted_sum(row, weights);
+            sums[begin / kRows * axes.size() + a] +=
+                brute_force::weighted_sum(row, values) * row.omega;
           }
         }
       },

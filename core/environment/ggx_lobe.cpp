@@ -36,27 +36,16 @@ GgxLobe::GgxLobe(double alpha) : alpha_(alpha) {
 
 namespace {
 
-double value_at(double cosine, double narrow, double broad, double scale) {
-  const double beside = 1 - cosine > 0 ? 1 - cosine : 0;
-  const double d = narrow + broad * beside;
-  const double value = scale * cosine / (d * d);
-  return cosine > 0 ? value : 0;
-}
-
 LIGHTKILN_CLONES void fill_values(const GgxLobe& lobe, std::span<const double> cosines,
                                   std::span<double> values) {
-  const double narrow = lobe.narrow(), broad = lobe.broad(), scale = lobe.scale();
+  const GgxLobe local = lobe;  // whose numbers no store below can change
   const double* from = cosines.data();
   double* to = values.data();
   const size_t count = values.size();
-  for (size_t i = 0; i < count; ++i) to[i] = value_at(from[i], narrow, broad, scale);
+  for (size_t i = 0; i < count; ++i) to[i] = local(from[i]);
 }
 
 }  // namespace
-
-double GgxLobe::operator()(double cosine) const {
-  return value_at(cosine, narrow_, broad_, scale_);
-}
 
 void GgxLobe::fill(std::span<const double> cosines, std::span<double> values) const {
   fill_values(*this, cosines, values);

@@ -17,7 +17,12 @@ class GgxLobe final : public ZonalKernel {
   explicit GgxLobe(double alpha);
 
   double alpha() const { return alpha_; }
-  double operator()(double cosine) const;
+  double operator()(double cosine) const {
+    const double beside = 1 - cosine > 0 ? 1 - cosine : 0;
+    const double d = narrow_ + broad_ * beside;
+    const double value = scale_ * cosine / (d * d);
+    return cosine > 0 ? value : 0;
+  }
   // The same for each of `cosines`, with the same bits.
   void fill(std::span<const double> cosines, std::span<double> values) const;
   // The same from the angle, exact for narrow lobes, where the cosine has lost its digits.

@@ -96,9 +96,13 @@ Blobs::Draft::~Draft() {
 
 void Blobs::Draft::append(const void* data, size_t size) {
   hash_.append(data, size);
+  write(data, size);
+}
+
+void Blobs::Draft::write(const void* data, size_t size) {
   const char* next = static_cast<const char*>(data);
   while (size > 0) {
-    const ssize_t written = write(fd_, next, size);
+    const ssize_t written = ::write(fd_, next, size);
     if (written < 0 && errno == EINTR) continue;
     if (written < 0) refuse_to_write("The store cannot write");
     next += written;
@@ -130,11 +134,16 @@ std::string Blobs::put(std::span<const std::byte> bytes) {
   Sha256 hash;
   hash.append(bytes.data(), bytes.size());
   std::string digest = hash.digest();
-  if (has_verified(digest)) return digest;
-  Draft draft(*this);
-  draft.append(bytes.data(), bytes.size());
-  draft.keep();
+  put(bytes, digest);
   return digest;
+}
+
+void Blobs::put(std::span<const std::byte> bytes, const std::string& digest) {
+  if (has_verified(digest)) return;
+  Draft draft(*this);
+  draft.write(bytes.data(), bytes.size());
+  draft.digest_ = digest;
+  draft.keep();
 }
 
 std::string Blobs::path_of(const std::string& digest) const {

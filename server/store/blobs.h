@@ -41,6 +41,8 @@ class Blobs {
     bool keep();
 
    private:
+    friend class Blobs;
+    void write(const void* data, size_t size);  // without hashing it
     Blobs& blobs_;
     std::string path_, digest_;
     int fd_ = -1;
@@ -48,6 +50,8 @@ class Blobs {
   };
 
   std::string put(std::span<const std::byte> bytes);
+  // The same for bytes whose digest is known: hashing is most of what a large blob costs.
+  void put(std::span<const std::byte> bytes, const std::string& digest);
   // Throws Error{invalid_input} unless `digest` reads "sha256:<64 lower-case hex>".
   bool has(const std::string& digest) const;
   // As Store::open_blob.

@@ -229,7 +229,8 @@ void SqliteStore::commit_chunk(const Claim& claim, const ChunkCommit& chunk) {
     remove_orphans(db, {digest});
     return;
   }
-  blobs_.put(chunk.bytes);  // again under the lock: an equal file may have been an orphan meanwhile
+  // Again under the lock: an equal file may have been an orphan meanwhile.
+  blobs_.put(chunk.bytes, digest);
   db.run(
       "UPDATE tasks SET state=2, lease=0, worker='', digest=?3, report_json=?4, elements=?6, "
       "error_sum_sq=?7 WHERE job_id=?1 AND type=?2 AND chunk_index=?5",
