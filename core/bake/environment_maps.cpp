@@ -35,7 +35,7 @@ void EnvironmentMapsStateDeleter::operator()(EnvironmentMapsState* state) const 
 namespace {
 
 int bands_of(const MapsOutputs& outputs) {
-  int bands = sh_bands_of(outputs);
+  int bands = sh_need_of(outputs).bands;
   for (const LobePlan& lobe : lobes_of(outputs)) bands = std::max(bands, lobe.bands);
   return bands;
 }
@@ -147,10 +147,15 @@ Effect harmonics_effect(const EnvironmentMapsState& state) {
   if (bands == 0) {
     return {"harmonic_transform", false, "No output of this order is made from harmonics.", 0};
   }
-  return {"harmonic_transform", true,
-          "The map is projected once, to " + std::to_string(bands) +
-              " bands, which every output that needs harmonics shares.",
-          1};
+  return {
+      "harmonic_transform", true,
+      "The map is projected once, to " + std::to_string(bands) + " bands by " +
+          std::to_string(state.light.row_points()) +
+          " points in each row, which every output that needs harmonics shares." +
+          (bands <= direct_row_orders(state.light.environment().radiance.width)
+               ? " Nearly all of its time is one pass over the map, which no order makes shorter."
+               : ""),
+      1};
 }
 
 std::vector<Effect> list_effects(EnvironmentMapsState& state) {
@@ -177,7 +182,8 @@ double model_seconds(MapsLight& light, const MapsOutputs& outputs, int check_tex
     const double row = bands <= direct_row_orders(map.width)
                            ? kDirectPerTexel + kDirectPerOrder * bands
                            : kFourierPerPoint * std::log2(width + 1);
-    seconds += row * width * height + kLegendrePerTerm * height * bands * bands;
+    const int points = row_points(map.height, lobes_of(outputs), sh_need_of(outputs));
+    seconds += row * width * height + kLegendrePerTerm * points * height * bands * bands;
   }
   for (const auto& output : outputs) {
     seconds += output->model_seconds(light);

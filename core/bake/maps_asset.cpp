@@ -7,6 +7,7 @@
 
 #include "core/bake/maps_cost.h"
 #include "core/bake/maps_cube.h"
+#include "core/bake/maps_sh.h"
 #include "core/base/parallel.h"
 #include "core/base/text.h"
 #include "core/environment/lookup_cube.h"
@@ -43,6 +44,7 @@ class AssetLevel : public ConvolvedCube {
                       roughness > 0 ? std::optional(Lobe{LobeKind::ggx, roughness * roughness})
                                     : std::nullopt,
                       1, target),
+        sh_need_(coefficients_need(kBands, target)),
         index_(index),
         levels_(levels),
         roughness_(roughness),
@@ -50,7 +52,7 @@ class AssetLevel : public ConvolvedCube {
 
   SpectrumNeed spectrum_need() const override {
     SpectrumNeed need = ConvolvedCube::spectrum_need();
-    if (index_ == 0 && !constant()) need.sh_bands = kBands;
+    if (index_ == 0 && !constant()) need.sh = sh_need_;
     return need;
   }
 
@@ -146,6 +148,7 @@ class AssetLevel : public ConvolvedCube {
     writer.f64(sum > 0 ? cut_off / sum : 0);
   }
 
+  ShNeed sh_need_;
   int index_, levels_;
   double roughness_;
   std::shared_ptr<GltfImageLight> asset_;  // what the levels before have filed

@@ -6,6 +6,7 @@
 #include "core/bake/maps_cost.h"
 #include "core/base/parallel.h"
 #include "core/base/text.h"
+#include "core/environment/bright_light.h"
 #include "core/environment/brute_force.h"
 #include "core/environment/charlie_lobe.h"
 #include "core/environment/ggx_lobe.h"
@@ -27,7 +28,7 @@ double ConvolvedCube::error_bound() const {
 }
 
 SpectrumNeed ConvolvedCube::spectrum_need() const {
-  return {0, plan_.bands > 0 ? &plan_ : nullptr};
+  return {{}, plan_.bands > 0 ? &plan_ : nullptr};
 }
 
 double ConvolvedCube::model_seconds(MapsLight& light) const {
@@ -38,7 +39,8 @@ double ConvolvedCube::model_seconds(MapsLight& light) const {
   const double cut = plan_.bands;
   double seconds = kRingPerTerm * cut * cut * cut + kPerTexel * texels;
   if (plan_.corrected) {
-    seconds += kPerBrightTexel * texels * static_cast<double>(light.statistics().bright.size());
+    seconds += kPerBrightPoint * texels *
+               cut_light_points(light.statistics(), plan_.bands, plan_.cell_phase);
   }
   if (plan_.split > 0) {
     seconds += kPerCorePoint * texels *

@@ -13,14 +13,13 @@ namespace {
 
 class DfgTable : public MapsOutput {
  public:
-  explicit DfgTable(const DfgOutput& order)
-      : size_(order.size), options_{order.multiple_scattering, order.charlie} {}
+  DfgTable(const DfgOutput& order, double error)
+      : size_(order.size), options_{order.multiple_scattering, order.charlie, error} {}
 
-  double error_bound() const override {
-    return std::max(kDfgErrorBound, options_.charlie ? kCharlieAlbedoErrorBound : 0.0);
-  }
+  double error_bound() const override { return dfg_table_bound(options_); }
   double model_seconds(MapsLight&) const override {
-    return (kPerDfgValue + (options_.charlie ? kPerCharlieValue : 0)) * size_ * size_;
+    const DfgTableWork work = dfg_table_work(options_);
+    return (kPerDfgPoint * work.ggx + kPerCharliePoint * work.sheen) * size_ * size_;
   }
 
   MeasuredError make(MapsLight& light, int check_texels, ByteWriter& writer,
@@ -79,9 +78,10 @@ class DfgTable : public MapsOutput {
   DfgTableOptions options_;
 };
 
-void order_dfg(const EnvironmentMapsParameters& parameters, MapsLight&, double,
+// The bound holds for every entry of the table, so that nothing is held back for a single one.
+void order_dfg(const EnvironmentMapsParameters& parameters, MapsLight&, double target,
                MapsOutputs* outputs) {
-  outputs->push_back(std::make_unique<DfgTable>(*parameters.dfg));
+  outputs->push_back(std::make_unique<DfgTable>(*parameters.dfg, ordered_error(target)));
 }
 
 }  // namespace
@@ -97,7 +97,7 @@ double measure_speed() {
   const double start_s = thread_cpu_seconds();
   for (int i = 1; i <= kCount; ++i) sum += ggx_dfg(0.25, double(i) / kCount).scale;
   const double spent_s = thread_cpu_seconds() - start_s;
-  return sum > 0 ? std::clamp(spent_s / (kCount * kPerDfgValue), 0.05, 20.0) : 1.0;
+  return sum > 0 ? std::clamp(spent_s / (kCount * kDfgPoints * kPerDfgPoint), 0.05, 20.0) : 1.0;
 }
 
 }  // namespace lightkiln

@@ -53,15 +53,16 @@ class BandedIrradianceCube : public MapsOutput {
   BandedIrradianceCube(MapsLight& light, int size, int bands, double target)
       : size_(size), bands_(bands), constant_(light.constant()) {
     if (constant_) return;
-    plan_ = plan_irradiance_bands(light.statistics(), bands);
+    plan_ = plan_irradiance_bands(light.statistics(), bands, target);
     whole_ = plan_lobe(light.statistics(), {LobeKind::ggx, 1}, target);
   }
 
   double error_bound() const override { return plan_.error_bound; }
-  // What is left out is told from the bands that the whole would need.
+  // What is left out is told from the bands that the whole would need. The bands themselves may err
+  // by as much as the level: sum_{l >= 1} h_l^2 is 0.52.
   SpectrumNeed spectrum_need() const override {
     if (constant_) return {};
-    return {bands_, &whole_};
+    return {{bands_, plan_.row_error}, &whole_};
   }
   double model_seconds(MapsLight&) const override {
     return constant_ ? 0 : kPerTexel * 6.0 * size_ * size_;

@@ -14,21 +14,25 @@ const LightStatistics& MapsLight::statistics() {
   return *statistics_;
 }
 
-void MapsLight::require(int sh_bands, std::span<const LobePlan> lobes) {
-  sh_bands_ = sh_bands;
+void MapsLight::require(const ShNeed& sh, std::span<const LobePlan> lobes) {
+  sh_ = sh;
   lobes_.assign(lobes.begin(), lobes.end());
   spectrum_.reset();
 }
 
 int MapsLight::bands() const {
-  int bands = sh_bands_;
+  int bands = sh_.bands;
   for (const LobePlan& lobe : lobes_) bands = std::max(bands, lobe.bands);
   return bands;
 }
 
+int MapsLight::row_points() const {
+  return lightkiln::row_points(environment_.radiance.height, lobes_, sh_);
+}
+
 const LatlongSpectrum& MapsLight::spectrum(Progress& progress) {
   if (!spectrum_) {
-    spectrum_ = project_for(environment_, lobes_, std::max(1, sh_bands_), threads_, progress);
+    spectrum_ = project_for(environment_, lobes_, sh_, threads_, progress);
   }
   return *spectrum_;
 }

@@ -30,9 +30,11 @@ class MapsLight {
 
   // What all outputs of the bake need together, so that coefficients do not depend on which output
   // comes first.
-  void require(int sh_bands, std::span<const LobePlan> lobes);
+  void require(const ShNeed& sh, std::span<const LobePlan> lobes);
   // Bands that require() asked for; 0 = none.
   int bands() const;
+  // Gauss points that each row is summed with for them.
+  int row_points() const;
   const LatlongSpectrum& spectrum(Progress& progress);
 
  private:
@@ -40,7 +42,7 @@ class MapsLight {
   std::optional<SunExtraction> sun_;
   int threads_;
   std::optional<LightStatistics> statistics_;
-  int sh_bands_ = 0;
+  ShNeed sh_;
   std::vector<LobePlan> lobes_;
   std::optional<LatlongSpectrum> spectrum_;
 };

@@ -31,14 +31,19 @@ std::vector<LobePlan> lobes_of(const MapsOutputs& outputs) {
   return lobes;
 }
 
-int sh_bands_of(const MapsOutputs& outputs) {
-  int bands = 0;
-  for (const auto& output : outputs) bands = std::max(bands, output->spectrum_need().sh_bands);
-  return bands;
+// The most bands, as exactly as the strictest asks.
+ShNeed sh_need_of(const MapsOutputs& outputs) {
+  ShNeed most{0, 1};
+  for (const auto& output : outputs) {
+    const ShNeed need = output->spectrum_need().sh;
+    if (need.bands == 0) continue;
+    most = {std::max(most.bands, need.bands), std::min(most.error, need.error)};
+  }
+  return most;
 }
 
 void require_spectrum(const MapsOutputs& outputs, MapsLight* light) {
-  light->require(sh_bands_of(outputs), lobes_of(outputs));
+  light->require(sh_need_of(outputs), lobes_of(outputs));
 }
 
 namespace {

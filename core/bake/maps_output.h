@@ -15,7 +15,7 @@ namespace lightkiln {
 
 // What an output needs of the map's coefficients.
 struct SpectrumNeed {
-  int sh_bands = 0;                // at full accuracy
+  ShNeed sh = {};                  // as coefficients
   const LobePlan* lobe = nullptr;  // those of a convolution, as exact as its responses ask
 };
 
@@ -72,7 +72,7 @@ MapsOutputs order_outputs(const EnvironmentMapsParameters& parameters, MapsLight
 
 // What the outputs need of the map's coefficients together.
 std::vector<LobePlan> lobes_of(const MapsOutputs& outputs);
-int sh_bands_of(const MapsOutputs& outputs);
+ShNeed sh_need_of(const MapsOutputs& outputs);
 void require_spectrum(const MapsOutputs& outputs, MapsLight* light);
 
 // What is to be taken out of the map before any output is made; none when no sun is ordered.

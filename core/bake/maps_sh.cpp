@@ -20,6 +20,17 @@ Vec3d coefficient_of(const LatlongSpectrum& spectrum, int l, int m) {
 
 }  // namespace
 
+ShNeed coefficients_need(int bands, double target) {
+  constexpr double kFinest = 1e-11;
+  return {bands, std::max(kFinest, 0.01 * target)};
+}
+
+double coefficients_bound(const ShNeed& need, int height) {
+  constexpr double kRounding = 1e-12;
+  if (need.bands == 0) return 0;
+  return row_band_error(row_points(height, {}, need), need.bands - 1, height) + kRounding;
+}
+
 // The turn into the world frame is a rotation, which tests hold to 1e-12; what is checked here is
 // the projection.
 MeasuredError check_coefficients(MapsLight& light, int bands, int count, Progress& progress) {
@@ -85,10 +96,15 @@ void visit_report(auto& report, const auto& visit) {
 
 class Coefficients : public MapsOutput {
  public:
-  Coefficients(const ShOutput& order, bool constant) : order_(order), constant_(constant) {}
+  Coefficients(const ShOutput& order, const MapsLight& light, double target)
+      : order_(order), constant_(light.constant()) {
+    if (constant_) return;
+    need_ = coefficients_need(projected(), target);
+    bound_ = coefficients_bound(need_, light.environment().radiance.height);
+  }
 
-  double error_bound() const override { return constant_ ? 0 : kShErrorBound; }
-  SpectrumNeed spectrum_need() const override { return {constant_ ? 0 : projected(), nullptr}; }
+  double error_bound() const override { return bound_; }
+  SpectrumNeed spectrum_need() const override { return {need_, nullptr}; }
   double model_seconds(MapsLight&) const override {
     if (constant_ || order_.window == ShWindow::none) return 0;
     const double searches = order_.window == ShWindow::minimal ? kWindowSearches : 6;
@@ -145,11 +161,13 @@ class Coefficients : public MapsOutput {
 
   ShOutput order_;
   bool constant_;
+  ShNeed need_;  // none of a constant map
+  double bound_ = 0;
 };
 
-void order_sh(const EnvironmentMapsParameters& parameters, MapsLight& light, double,
+void order_sh(const EnvironmentMapsParameters& parameters, MapsLight& light, double target,
               MapsOutputs* outputs) {
-  outputs->push_back(std::make_unique<Coefficients>(*parameters.sh, light.constant()));
+  outputs->push_back(std::make_unique<Coefficients>(*parameters.sh, light, target));
 }
 
 }  // namespace

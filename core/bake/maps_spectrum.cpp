@@ -18,11 +18,15 @@ constexpr int kMeasuredBands = 257;
 
 class Spectrum : public MapsOutput {
  public:
-  Spectrum(int bands, bool constant, double ordered)
-      : bands_(bands), constant_(constant), ordered_(ordered) {}
+  Spectrum(int bands, const MapsLight& light, double target)
+      : bands_(bands), constant_(light.constant()), ordered_(ordered_error(target)) {
+    if (constant_) return;
+    need_ = coefficients_need(kMeasuredBands, target);
+    bound_ = coefficients_bound(need_, light.environment().radiance.height);
+  }
 
-  double error_bound() const override { return constant_ ? 0 : kShErrorBound; }
-  SpectrumNeed spectrum_need() const override { return {constant_ ? 0 : kMeasuredBands, nullptr}; }
+  double error_bound() const override { return bound_; }
+  SpectrumNeed spectrum_need() const override { return {need_, nullptr}; }
   double model_seconds(MapsLight& light) const override {
     const Image& map = light.environment().radiance;
     return constant_ ? 0 : kEnergyPerTexel * map.width * map.height;
@@ -75,12 +79,13 @@ class Spectrum : public MapsOutput {
   int bands_;
   bool constant_;
   double ordered_;
+  ShNeed need_;  // none of a constant map
+  double bound_ = 0;
 };
 
 void order_spectrum(const EnvironmentMapsParameters& parameters, MapsLight& light, double target,
                     MapsOutputs* outputs) {
-  outputs->push_back(std::make_unique<Spectrum>(parameters.spectrum->bands, light.constant(),
-                                                ordered_error(target)));
+  outputs->push_back(std::make_unique<Spectrum>(parameters.spectrum->bands, light, target));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "core/base/instruction_sets.h"
 #include "core/sphere/direction_map.h"
+#include "core/sphere/harmonics.h"
 
 namespace lightkiln {
 
@@ -27,25 +28,33 @@ double fast_acos(double c) {
   return c < 0 ? kPi - angle : angle;
 }
 
-// Angles between a direction and `count` others, times `scale`. The same bits with any vector
-// width.
+// Cosines of the angles between a direction and `count` others, and the angles times `scale`. The
+// same bits with any vector width.
 LIGHTKILN_CLONES void find_places(const Vec3d& direction, const double* x, const double* y,
-                                  const double* z, double scale, double* places, size_t count) {
+                                  const double* z, double scale, double* cosines, double* places,
+                                  size_t count) {
   for (size_t i = 0; i < count; ++i) {
-    const double cosine = x[i] * direction.x + y[i] * direction.y + z[i] * direction.z;
-    places[i] = fast_acos(cosine) * scale;
+    cosines[i] = x[i] * direction.x + y[i] * direction.y + z[i] * direction.z;
+    places[i] = fast_acos(cosines[i]) * scale;
   }
 }
 
-constexpr int kTableStepsPerBand = 32;
+// Between steps the table is read linearly, which a wave of band l loses (l step)^2 / 8 of.
+constexpr int kTableStepsPerBand = 128;
+constexpr int kSumStepsPerBand = 8;
 
-// What the band limit cuts off the lobe: K(t) - sum_{l<L} (2l+1)/(4 pi) h_l P_l(cos t), at equal
-// steps of the angle from 0 to pi. An even number of steps puts the kink at pi/2 on a point.
+// What the band limit cuts off the lobe, but for its kink: K(t) - slope max(cos t, 0) -
+// sum_{l<L} (2l+1)/(4 pi) h_l P_l(cos t), at equal steps of the angle from 0 to pi. The sum is
+// smooth: it is evaluated at every sixteenth step, even in t about both ends, and interpolated
+// between by the polynomial through eight of those, which loses 4e-7 of band L (0.27 (pi / 16)^8 at
+// phase pi / 8).
 std::vector<double> cut_table(const ZonalKernel& kernel, const std::vector<double>& responses) {
-  const int steps = kTableStepsPerBand * static_cast<int>(responses.size());
-  std::vector<double> table(static_cast<size_t>(steps) + 2);
-  for (int i = 0; i <= steps; ++i) {
-    const double angle = kPi * i / steps, z = std::cos(angle);
+  constexpr int kFine = kTableStepsPerBand / kSumStepsPerBand, kTaps = 8;
+  const int bands = static_cast<int>(responses.size());
+  const int coarse = kSumStepsPerBand * bands, steps = kFine * coarse;
+  std::vector<double> sums(static_cast<size_t>(coarse) + 1);
+  for (int i = 0; i <= coarse; ++i) {
+    const double z = std::cos(kPi * i / coarse);
     double before = 0, value = 1, sum = 0;
     for (size_t l = 0; l < responses.size(); ++l) {
       const double degree = static_cast<double>(l);
@@ -56,7 +65,30 @@ std::vector<double> cut_table(const ZonalKernel& kernel, const std::vector<doubl
       }
       sum += (2 * degree + 1) / (4 * kPi) * responses[l] * value;
     }
-    table[static_cast<size_t>(i)] = kernel.at_angle(angle) - sum;
+    sums[static_cast<size_t>(i)] = sum;
+  }
+  const double slope = kernel.horizon_slope();
+  double weights[kFine][kTaps];
+  for (int part = 0; part < kFine; ++part) {
+    for (int i = 0; i < kTaps; ++i) {
+      double weight = 1;
+      for (int j = 0; j < kTaps; ++j) {
+        if (j != i) weight *= (double(part) / kFine - (j - 3)) / (i - j);
+      }
+      weights[part][i] = weight;
+    }
+  }
+  const auto sum_at = [&](int i) {
+    const int mirrored = i < 0 ? -i : i > coarse ? 2 * coarse - i : i;
+    return sums[static_cast<size_t>(mirrored)];
+  };
+  std::vector<double> table(static_cast<size_t>(steps) + 2);
+  for (int i = 0; i <= steps; ++i) {
+    double sum = 0;
+    for (int k = 0; k < kTaps; ++k) sum += weights[i % kFine][k] * sum_at(i / kFine + k - 3);
+    const double angle = kPi * i / steps;
+    table[static_cast<size_t>(i)] =
+        kernel.at_angle(angle) - slope * std::max(0.0, std::cos(angle)) - sum;
   }
   table.back() = table[static_cast<size_t>(steps)];
   return table;
@@ -64,7 +96,7 @@ std::vector<double> cut_table(const ZonalKernel& kernel, const std::vector<doubl
 
 // The mean of the table over a square cell of side `extent` about each of its angles. A square has
 // the same second moment extent^2 / 12 in every direction: along the angle the mean over an
-// interval of that length, which also rounds the kink, and across it extent^2 / 24 cot(t) K'(t).
+// interval of that length, and across it extent^2 / 24 cot(t) K'(t).
 std::vector<double> cell_means(const std::vector<double>& table, double extent) {
   const int steps = static_cast<int>(table.size()) - 2;
   const double step = kPi / steps, half = 0.5 * extent / step;
@@ -95,83 +127,183 @@ std::vector<double> cell_means(const std::vector<double>& table, double extent) 
   return means;
 }
 
-// A texel acts as a point on bands l while l times its extent is small; larger ones are cut into
-// this many a side, as long as the points stay few.
-constexpr int kMostPoints = 384;
-static_assert(kMaxBrightTexels <= kMostPoints);
-constexpr double kPointPhase = 0.2;
-int point_cuts(const LightStatistics& light, int bands) {
-  const double most = std::sqrt(kMostPoints / static_cast<double>(light.bright.size()));
-  const double wanted = std::ceil(light.bright.front().extent_rad * bands / kPointPhase);
-  return static_cast<int>(std::clamp(wanted, 1.0, std::max(1.0, std::floor(most))));
+// How a bright texel is cut: rows of colatitude, columns of longitude.
+struct Cells {
+  int rows = 1, columns = 1;
+  double height = 0, width = 0;  // of a cell, radians along the sphere
+  double side2() const { return (height * height + width * width) / 2; }
+};
+
+// Of the three finest numbers of rows that are fine enough, the one whose cells are most nearly
+// square.
+Cells cells_of(const BrightTexel& texel, int bands, double phase) {
+  const double side = texel.extent_rad, ring = std::hypot(texel.direction.x, texel.direction.z);
+  const int fewest = std::max(1, static_cast<int>(std::ceil(side * bands / phase)));
+  Cells best;
+  double least = -1;
+  for (int rows = fewest; rows < fewest + 3; ++rows) {
+    const int columns = std::max(1, static_cast<int>(std::lround(rows * ring)));
+    const Cells cells{rows, columns, side / rows, side * ring / columns};
+    const double skew = std::abs(cells.height * cells.height - cells.width * cells.width);
+    if (least >= 0 && skew >= 0.5 * least) continue;
+    best = cells;
+    least = skew;
+  }
+  return best;
+}
+
+// The mean over all bright light of a cell's squared side.
+double common_side2(const LightStatistics& light, int bands, double phase) {
+  double sum = 0, all = 0;
+  for (const BrightTexel& texel : light.bright) {
+    const double energy = luminance(texel.energy);
+    sum += energy * cells_of(texel, bands, phase).side2();
+    all += energy;
+  }
+  return sum / all;
+}
+
+constexpr int kUsualPoints = 384;
+constexpr int kMostPoints = 2500;  // where fewer would miss the target
+
+// The mean of max(c + x + y, 0) over |x| <= a, |y| <= b: the second differences of its fourfold
+// antiderivative z^3 / 6, over the area 4 a b. Sides next to nothing are widened by a thousandth.
+double kink_mean(double c, double a, double b) {
+  a = std::max(a, 1e-3 * b);
+  b = std::max(b, 1e-3 * a);
+  const auto cube = [](double z) { return z > 0 ? z * z * z : 0.0; };
+  return (cube(c + a + b) - cube(c + a - b) - cube(c - a + b) + cube(c - a - b)) / (24 * a * b);
 }
 
 }  // namespace
 
-// Cells are squares of colatitude and longitude, narrowed by the sine of the colatitude; the mean
-// extent of the brightest stands for all.
+// Cells of equal steps of longitude and colatitude.
 CutLight::CutLight(const LightStatistics& light, const ZonalKernel& kernel,
-                   const std::vector<double>& responses) {
-  const int cuts = point_cuts(light, static_cast<int>(responses.size()));
+                   const std::vector<double>& responses, double phase)
+    : slope_(kernel.horizon_slope()) {
+  const int bands = static_cast<int>(responses.size());
   for (const BrightTexel& texel : light.bright) {
+    const Cells cells = cells_of(texel, bands, phase);
     double u = 0, v = 0;
     latlong_coordinates(texel.direction, &u, &v);
-    const double dv = texel.extent_rad / kPi / cuts, du = dv / 2;  // texels of a 2:1 map are square
+    const double extent = texel.extent_rad / kPi;  // texels of a 2:1 map are square in u / 2 and v
+    const double dv = extent / cells.rows, du = extent / 2 / cells.columns;
+    const auto middle = [&](int row) { return v + dv * (row + 0.5 - 0.5 * cells.rows); };
     double all = 0;
-    for (int j = 0; j < cuts; ++j) all += cuts * std::sin(kPi * (v + dv * (j + 0.5 - 0.5 * cuts)));
-    for (int j = 0; j < cuts; ++j) {
-      const double middle = v + dv * (j + 0.5 - 0.5 * cuts), sine = std::sin(kPi * middle);
+    for (int j = 0; j < cells.rows; ++j) all += cells.columns * std::sin(kPi * middle(j));
+    for (int j = 0; j < cells.rows; ++j) {
+      const double sine = std::sin(kPi * middle(j));
       // A cell's centre of mass lies a little towards the equator.
-      const double centre = middle + kPi * dv * dv / 12 * std::cos(kPi * middle) / sine;
-      for (int i = 0; i < cuts; ++i) {
-        const Vec3d direction = latlong_direction(u + du * (i + 0.5 - 0.5 * cuts), centre);
-        x_.push_back(direction.x);
-        y_.push_back(direction.y);
-        z_.push_back(direction.z);
-        energy_.push_back(texel.energy * (sine / all));
+      const double centre = middle(j) + kPi * dv * dv / 12 * std::cos(kPi * middle(j)) / sine;
+      for (int i = 0; i < cells.columns; ++i) {
+        const Vec3d at = latlong_direction(u + du * (i + 0.5 - 0.5 * cells.columns), centre);
+        const double half_width = 0.5 * cells.width, half_height = 0.5 * cells.height;
+        const Vec3d across = normalize(Vec3d{at.z, 0, -at.x});
+        x_.push_back(at.x);
+        y_.push_back(at.y);
+        z_.push_back(at.z);
+        cells_.push_back({texel.energy * (sine / all), across * half_width,
+                          cross(across, at) * half_height, half_width + half_height,
+                          1 - cells.side2() / 12});
       }
     }
   }
-  const BrightTexel& brightest = light.bright.front();
-  const double sine2 = 1 - brightest.direction.y * brightest.direction.y;
-  table_ = cell_means(cut_table(kernel, responses),
-                      brightest.extent_rad / cuts * std::sqrt((1 + sine2) / 2));
+  table_ = cell_means(cut_table(kernel, responses), std::sqrt(common_side2(light, bands, phase)));
 }
 
+int cut_light_points(const LightStatistics& light, int bands, double phase) {
+  int points = 0;
+  for (const BrightTexel& texel : light.bright) {
+    const Cells cells = cells_of(texel, bands, phase);
+    points += cells.rows * cells.columns;
+  }
+  return points;
+}
+
+// In blocks of points, whose angles are found side by side.
 Vec3d CutLight::at(const Vec3d& direction) const {
+  constexpr size_t kBlock = 128;
   const double scale = static_cast<double>(table_.size() - 2) / kPi;
-  std::array<double, kMostPoints> places;
-  find_places(direction, x_.data(), y_.data(), z_.data(), scale, places.data(), energy_.size());
+  std::array<double, kBlock> cosines, places;
   Vec3d sum;
-  for (size_t i = 0; i < energy_.size(); ++i) {
-    const size_t index = static_cast<size_t>(places[i]);
-    const double f = places[i] - static_cast<double>(index);
-    sum += energy_[i] * (table_[index] * (1 - f) + table_[index + 1] * f);
+  for (size_t first = 0; first < cells_.size(); first += kBlock) {
+    const size_t count = std::min(kBlock, cells_.size() - first);
+    find_places(direction, &x_[first], &y_[first], &z_[first], scale, cosines.data(), places.data(),
+                count);
+    for (size_t i = 0; i < count; ++i) {
+      const Cell& cell = cells_[first + i];
+      const size_t index = static_cast<size_t>(places[i]);
+      const double f = places[i] - static_cast<double>(index);
+      const double kink = std::abs(cosines[i]) < cell.reach
+                              ? kink_mean(cosines[i], std::abs(dot(cell.across, direction)),
+                                          std::abs(dot(cell.down, direction)))
+                              : std::max(cosines[i], 0.0);
+      sum += cell.energy *
+             (table_[index] * (1 - f) + table_[index + 1] * f + slope_ * cell.shrink * kink);
+    }
   }
   return sum;
 }
 
-// Bright texels stand as points of extent s: band l of a box differs from a point's by at most
-// min(1, (l s)^2 / 24) of it. Taken as if all their energy E were one source, whose squared norm in
-// band l is E^2 (2l+1) / (4 pi). Beyond the computed bands only even ones are left, which fall as
-// l^-2.5; past sixteen times as many, the sum's rest is an integral.
-double cut_light_bound(const LightStatistics& light, const std::vector<double>& responses,
-                       int bands) {
-  const double extent = light.bright.front().extent_rad / point_cuts(light, bands);
+// A cell a by b against a wave of band l that crosses it at an angle p to its side a has the factor
+// sinc(l a cos p / 2) sinc(l b sin p / 2), where the table has sinc(l s / 2):
+//   1 - l^2 (a^2 cos^2 p + b^2 sin^2 p) / 24 + ...  against  1 - l^2 s^2 / 24 + ...
+// The second-order terms differ by at most l^2 (|(a^2 + b^2) / 2 - s^2| + |a^2 - b^2| / 2) / 24,
+// the fourth-order ones by at most (l max(a, b))^4 / 2560 (at b = 0; 1 / 5760 for a square), and
+// both factors lie between -0.22 and 1. Reading the table loses another (l step)^2 / 8. Taken as if
+// all bright light E were one source, whose squared norm in band l is E^2 (2l+1) / (4 pi).
+//
+// The kernel is slope max(c, 0), whose bands are slope A_l and whose mean over a cell is exact, and
+// a rest of bands h_l - slope A_l, which falls as l^-3.5. The table holds all bands of the rest
+// beyond the limit and, negative, the kink's below it. Past the computed bands every other one is
+// left; past sixteen times as many, the sum is an integral.
+double cut_light_bound(const LightStatistics& light, const ZonalKernel& kernel,
+                       const std::vector<double>& responses, int bands, double phase) {
+  const double side2 = common_side2(light, bands, phase);
+  double second = 0, fourth = 0, all = 0;
+  for (const BrightTexel& texel : light.bright) {
+    const Cells cells = cells_of(texel, bands, phase);
+    const double energy = luminance(texel.energy);
+    const double a2 = cells.height * cells.height, b2 = cells.width * cells.width;
+    second += energy * (std::abs(cells.side2() - side2) + std::abs(a2 - b2) / 2) / 24;
+    fourth += energy * std::max(a2, b2) * std::max(a2, b2) / 2560;
+    all += energy;
+  }
+  const double step = kPi / (kTableStepsPerBand * double(bands));
+  second = second / all + step * step / 8;
+  fourth /= all;
   const auto term = [&](double l, double response) {
-    const double miss = std::min(1.0, l * l * extent * extent / 24) * response;
+    const double l2 = l * l, miss = std::min(1.22, l2 * second + l2 * l2 * fourth) * response;
     return (2 * l + 1) * miss * miss;
   };
-  double sum = 0;
-  for (size_t l = static_cast<size_t>(bands); l < responses.size(); ++l) {
-    sum += term(static_cast<double>(l), responses[l]);
+  double sum = 0, last = 0;
+  for (size_t l = 1; l < responses.size(); ++l) {
+    const double kink = kernel.horizon_slope() * clamped_cosine_band(static_cast<int>(l));
+    const bool below = l < static_cast<size_t>(bands);
+    sum += term(static_cast<double>(l), below ? kink : responses[l] - kink);
+    if (l + 2 >= responses.size()) last = std::max(last, std::abs(responses[l] - kink));
   }
   const double count = static_cast<double>(responses.size());
-  const double last = std::max(std::abs(responses.back()), std::abs(responses.end()[-2]));
   double l = count;
-  for (; l < 16 * count; l += 2) sum += term(l, last * std::pow(l / count, -2.5));
-  sum += last * last * std::pow(l / count, -5) * l * l / 3;
+  for (; l < 16 * count; l += 2) sum += term(l, last * std::pow(l / count, -3.5));
+  sum += 1.5 * last * last * std::pow(l / count, -7) * l * l / 5;
   return light.bright_share * std::sqrt(sum);
+}
+
+double cut_light_phase(const LightStatistics& light, const ZonalKernel& kernel,
+                       const std::vector<double>& responses, int bands, double allowance) {
+  double best = 0, least = -1;
+  for (const double phase :
+       {64.0, 32.0, 16.0, 8.0, 4.0, 2.8, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35, 0.25}) {
+    const int most = least <= 1 / kPhaseShare * allowance ? kUsualPoints : kMostPoints;
+    if (least >= 0 && cut_light_points(light, bands, phase) > most) break;
+    const double bound = cut_light_bound(light, kernel, responses, bands, phase);
+    if (least >= 0 && bound >= least) continue;
+    best = phase;
+    least = bound;
+    if (bound <= allowance) break;
+  }
+  return best;
 }
 
 }  // namespace lightkiln

@@ -93,9 +93,9 @@ std::vector<Vec3d> lobe_averages(const Environment& environment, const Lobe& lob
   const double side = std::max(step, row_step);
   const double reach = 50 * side < widths.elsewhere_rad ? 50 * side - widths.core_rad : kPi;
   const double near = reach > 0 ? std::cos(std::min(kPi, reach)) : 2;
-  const auto cells_of = [&](double cosine) {
+  const auto cells_of = [&](double cosine, bool bright) {
     // On the lobe's horizon, a kink crosses the texel.
-    if (std::abs(cosine) < side) return side / kKinkCell;
+    if (std::abs(cosine) < side) return bright ? double(brute_force::kMostCells) : side / kKinkCell;
     return 8 * side /
            std::min(widths.core_rad + std::max(0.0, std::acos(cosine) - side),
                     widths.elsewhere_rad);
@@ -115,8 +115,9 @@ std::vector<Vec3d> lobe_averages(const Environment& environment, const Lobe& lob
             lobe.fill(cosines, values);
             brute_force::find_exceptions(row, cosines, side, near, &exceptions);
             for (const size_t x : exceptions) {
-              const int cells = std::clamp(static_cast<int>(std::ceil(cells_of(cosines[x]))), 1,
-                                           brute_force::kMostCells);
+              const int cells =
+                  std::clamp(static_cast<int>(std::ceil(cells_of(cosines[x], row.bright[x]))), 1,
+                             brute_force::kMostCells);
               values[x] = brute_force::integrate_lobe(
                               lobe, axes[a], kPi - (static_cast<double>(x) + 1) * step,
                               static_cast<double>(y) * row_step, step, row_step, cells) /
@@ -137,8 +138,10 @@ std::vector<Vec3d> lobe_averages(const Environment& environment, const Lobe& lob
 // < 0 is the sine of |m|.
 Vec3d projected_coefficient(const Environment& environment, int l, int m);
 
-// The mean of the map, constant on each texel, over a texel of a cube: 200 x 200 points weighted by
-// solid angle.
-Vec3d texel_average(const Environment& environment, int face, int x, int y, int size);
+// The mean of the map, constant on each texel, over a texel of a cube: `meridians` of every column
+// of the map, each cut by the four planes of the texel's sides and summed row by row. Its error
+// falls as their square: to about 1e-5 of what the columns differ by at 64.
+Vec3d texel_average(const Environment& environment, int face, int x, int y, int size,
+                    int meridians = 64);
 
 }  // namespace lightkiln

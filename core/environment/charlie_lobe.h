@@ -20,6 +20,7 @@ class CharlieLobe final : public ZonalKernel {
   void fill(std::span<const double> cosines, std::span<double> values) const;
   double at_angle(double angle_rad) const override;
   double panel(double angle_rad) const override;
+  double horizon_slope() const override { return scale_; }
 
  private:
   double power_, scale_;

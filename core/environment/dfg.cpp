@@ -6,6 +6,7 @@
 
 #include "core/environment/dfg.h"
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
@@ -18,39 +19,39 @@
 
 namespace lightkiln {
 
-namespace {
+std::span<const DfgRule> dfg_rules() {
+  static const DfgRule rules[] = {{3, 5, 7e-3},   {4, 8, 1.5e-3},   {5, 10, 4e-4},   {6, 15, 9e-5},
+                                  {8, 16, 3e-5},  {10, 20, 9e-6},   {10, 25, 4e-6},  {12, 30, 2e-6},
+                                  {16, 40, 7e-7}, {20, 50, 2.7e-7}, {24, 60, 1.2e-7}};
+  return rules;
+}
 
-constexpr int kAzimuths = 10;  // on each side of a right angle
-constexpr int kRadii = 20;
-constexpr int kMostRefinement = 16;
-constexpr size_t kMostRadii = kMostRefinement * kRadii;
-
-struct Azimuth {
-  double cosine, sine, weight;
-};
-struct Rule {
-  std::vector<Azimuth> azimuths;       // of (0, pi); weights sum to 1
-  std::vector<double> radii, weights;  // in (0, 1)
-};
+const DfgRule& dfg_rule(double error) {
+  for (const DfgRule& rule : dfg_rules()) {
+    if (rule.error_bound <= error) return rule;
+  }
+  return dfg_rules().back();
+}
 
 // Gauss points, gathered quadratically where the integrand bends: at azimuth pi/2 and at the rim.
-Rule make_rule(int azimuths, int radii) {
-  Rule rule;
+DfgIntegral::DfgIntegral(int azimuths, int radii) {
+  assert(azimuths >= 1 && radii >= 1 && radii <= kMostDfgRadii);
   const GaussRule a = gauss_legendre(azimuths), r = gauss_legendre(radii);
   for (const int side : {-1, 1}) {
     for (size_t i = 0; i < a.nodes.size(); ++i) {
       const double s = 0.5 * (1 + a.nodes[i]);
       const double phi = kPi / 2 * (1 + side * s * s);
-      rule.azimuths.push_back({std::cos(phi), std::sin(phi), 0.5 * s * a.weights[i]});
+      nodes_.azimuths.push_back({std::cos(phi), std::sin(phi), 0.5 * s * a.weights[i]});
     }
   }
   for (size_t i = 0; i < r.nodes.size(); ++i) {
     const double s = 0.5 * (1 - r.nodes[i]);
-    rule.radii.push_back(1 - s * s);
-    rule.weights.push_back(s * r.weights[i]);
+    nodes_.radii.push_back(1 - s * s);
+    nodes_.weights.push_back(s * r.weights[i]);
   }
-  return rule;
 }
+
+namespace {
 
 // In the space stretched by 1/alpha, GGX normals are a unit hemisphere: h ~ (a d.x, a d.y, d.z),
 // and those visible from v = (s, 0, c) have the density (w.d) / (pi (1 + w.z) / 2) over the
@@ -63,7 +64,7 @@ Rule make_rule(int azimuths, int radii) {
 //   d = (2k cos phi, 2k sin phi, 1 - k^2) / (1 + k^2),  dw = (2k / (1 + k^2)) (2 dk / (1 + k^2))
 //   dphi.
 // Radii stand side by side for vector code, which gives the same bits at any width.
-LIGHTKILN_CLONES DfgValue integrate(double alpha, double cosine, const Rule& rule) {
+LIGHTKILN_CLONES DfgValue integrate(double alpha, double cosine, const DfgNodes& rule) {
   const double a2 = alpha * alpha, sine = std::sqrt((1 - cosine) * (1 + cosine));
   const double norm = 1 / std::sqrt(a2 * sine * sine + cosine * cosine);
   const double w_x = alpha * sine * norm, w_z = cosine * norm;
@@ -71,9 +72,9 @@ LIGHTKILN_CLONES DfgValue integrate(double alpha, double cosine, const Rule& rul
   const double open = 0.5 * (smith(cosine) / cosine + 1);  // 1 + L(v)
   const size_t radii = rule.radii.size();
   const double *places = rule.radii.data(), *weights = rule.weights.data();
-  std::array<double, kMostRadii> scales, biases;
+  std::array<double, kMostDfgRadii> scales, biases;
   DfgValue sum;
-  for (const Azimuth& azimuth : rule.azimuths) {
+  for (const DfgNodes::Azimuth& azimuth : rule.azimuths) {
     const double reach = sine / cosine * azimuth.cosine, root = std::sqrt(reach * reach + 1);
     const double rim = (reach > 0 ? reach + root : 1 / (root - reach)) / alpha;
     const double limit = rim / (1 + std::sqrt(1 + rim * rim));
@@ -104,12 +105,17 @@ LIGHTKILN_CLONES DfgValue integrate(double alpha, double cosine, const Rule& rul
 
 }  // namespace
 
-DfgValue ggx_dfg(double alpha, double cosine, int refinement) {
+DfgValue DfgIntegral::at(double alpha, double cosine) const {
   assert(alpha > 0 && alpha <= 1 && cosine > 0 && cosine <= 1);
-  assert(refinement >= 1 && refinement <= kMostRefinement);
-  static const Rule rule = make_rule(kAzimuths, kRadii);
-  if (refinement == 1) return integrate(alpha, cosine, rule);
-  return integrate(alpha, cosine, make_rule(refinement * kAzimuths, refinement * kRadii));
+  return integrate(alpha, cosine, nodes_);
+}
+
+DfgValue ggx_dfg(double alpha, double cosine, int refinement) {
+  constexpr int kAzimuths = 10, kRadii = 20;
+  static_assert(kDfgPoints == 2 * kAzimuths * kRadii);
+  static const DfgIntegral usual(kAzimuths, kRadii);
+  if (refinement == 1) return usual.at(alpha, cosine);
+  return DfgIntegral(refinement * kAzimuths, refinement * kRadii).at(alpha, cosine);
 }
 
 double compensated_reflectance(const DfgValue& value, double f0) {
@@ -117,24 +123,50 @@ double compensated_reflectance(const DfgValue& value, double f0) {
   return (f0 * value.scale + value.bias) * (1 + f0 * (1 / white - 1));
 }
 
+namespace {
+
+constexpr double kFloat = 6e-8;  // half a step of float below 1
+
+const DfgRule& ggx_rule(const DfgTableOptions& options) {
+  return dfg_rule(options.error - kFloat);
+}
+const CharlieRule& sheen_rule(const DfgTableOptions& options) {
+  return charlie_rule(options.error - kFloat);
+}
+
+}  // namespace
+
 Image dfg_table(int size, const DfgTableOptions& options, int threads, Progress& progress) {
   Image table(size, size, 3);
+  const DfgRule& rule = ggx_rule(options);
+  const DfgIntegral integral(rule.azimuths, rule.radii);
+  const CharlieIntegral sheen(sheen_rule(options).points);
   parallel_blocks(static_cast<size_t>(size), 4, threads, progress, [&](size_t begin, size_t end) {
     for (size_t row = begin; row < end; ++row) {
       const double roughness = (static_cast<double>(row) + 0.5) / size;
       const double alpha = roughness * roughness;
       for (int x = 0; x < size; ++x) {
         const double cosine = (x + 0.5) / size;
-        const DfgValue value = ggx_dfg(alpha, cosine);
+        const DfgValue value = integral.at(alpha, cosine);
         const double white = value.scale + value.bias;
         float* out = table.at(x, static_cast<int>(row));
         out[0] = static_cast<float>(options.multiple_scattering ? value.bias : value.scale);
         out[1] = static_cast<float>(options.multiple_scattering ? white : value.bias);
-        if (options.charlie) out[2] = static_cast<float>(charlie_albedo(alpha, cosine));
+        if (options.charlie) out[2] = static_cast<float>(sheen.at(alpha, cosine));
       }
     }
   });
   return table;
+}
+
+double dfg_table_bound(const DfgTableOptions& options) {
+  const double sheen = options.charlie ? sheen_rule(options).error_bound : 0.0;
+  return std::max(ggx_rule(options).error_bound, sheen) + kFloat;
+}
+
+DfgTableWork dfg_table_work(const DfgTableOptions& options) {
+  const int sheen = options.charlie ? sheen_rule(options).points : 0;
+  return {ggx_rule(options).points(), sheen * sheen};
 }
 
 }  // namespace lightkiln

@@ -58,6 +58,11 @@ double GgxLobe::at_angle(double angle_rad) const {
   return scale_ * std::cos(angle_rad) / (d * d);
 }
 
+double GgxLobe::horizon_slope() const {
+  const double d = narrow_ + broad_;
+  return scale_ / (d * d);
+}
+
 // No wider than half the distance to the lobe's nearest complex pole, about max(alpha, t).
 double GgxLobe::panel(double angle_rad) const {
   return 0.5 * std::max(alpha_, angle_rad);
@@ -67,21 +72,24 @@ double GgxLobe::panel(double angle_rad) const {
 // with s < split are wide, and what remains sums to the core:
 //   integral_split^inf s exp(-s d) ds = exp(-split d) (1 + split d) / d^2  (Ewald's device).
 // 1 - (1 + z) exp(-z) = z^2/2 - z^3/3 + z^4/8 - ... cancels for small z and is summed there.
+double GgxHalo::share(double distance) const {
+  const double z = split_ * (lobe_.narrow() + lobe_.broad() * distance);
+  if (z >= 0.1) return 1 - (1 + z) * std::exp(-z);
+  double sum = 0, term = z * z;  // the series' k-th term is (-1)^k (k - 1) / k! z^k
+  for (int k = 2; k < 12; ++k) {
+    sum += term * (k - 1);
+    term *= -z / (k + 1);
+  }
+  return 0.5 * sum;
+}
+
 double GgxHalo::at_angle(double angle_rad) const {
   const double s = std::sin(angle_rad / 2);
-  const double z = split_ * (lobe_.narrow() + lobe_.broad() * 2 * s * s);
-  double share = 0;
-  if (z < 0.1) {
-    double term = z * z;  // the series' k-th term is (-1)^k (k - 1) / k! z^k
-    for (int k = 2; k < 12; ++k) {
-      share += term * (k - 1);
-      term *= -z / (k + 1);
-    }
-    share *= 0.5;
-  } else {
-    share = 1 - (1 + z) * std::exp(-z);
-  }
-  return share * lobe_.at_angle(angle_rad);
+  return share(2 * s * s) * lobe_.at_angle(angle_rad);
+}
+
+double GgxHalo::horizon_slope() const {
+  return share(1) * lobe_.horizon_slope();
 }
 
 double GgxHalo::panel(double angle_rad) const {

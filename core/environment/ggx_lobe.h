@@ -28,6 +28,7 @@ class GgxLobe final : public ZonalKernel {
   // The same from the angle, exact for narrow lobes, where the cosine has lost its digits.
   double at_angle(double angle_rad) const override;
   double panel(double angle_rad) const override;
+  double horizon_slope() const override;
 
   // The lobe at 1 - cosine = x is scale() (1 - x) / d^2 with d = narrow() + broad() x.
   double scale() const { return scale_; }
@@ -47,8 +48,11 @@ class GgxHalo final : public ZonalKernel {
 
   double at_angle(double angle_rad) const override;
   double panel(double angle_rad) const override;
+  double horizon_slope() const override;
 
  private:
+  double share(double distance) const;  // of the lobe, at 1 - cosine
+
   GgxLobe lobe_;
   double split_;
 };

@@ -23,6 +23,8 @@ class ZonalKernel {
   virtual double at_angle(double angle_rad) const = 0;
   // How wide a Gauss panel that begins at this angle may be.
   virtual double panel(double angle_rad) const = 0;
+  // By how much it grows per unit of cosine just above the horizon, where it has a kink.
+  virtual double horizon_slope() const = 0;
 };
 std::unique_ptr<ZonalKernel> make_kernel(const Lobe& lobe);
 

@@ -12,18 +12,32 @@
 
 namespace lightkiln {
 
-LatlongSpectrum project_for(const Environment& environment, std::span<const LobePlan> lobes,
-                            int sh_bands, int threads, Progress& progress) {
-  std::vector<double> weights(static_cast<size_t>(sh_bands), 1.0);
-  for (const LobePlan& lobe : lobes) {
-    if (weights.size() < lobe.responses.size()) weights.resize(lobe.responses.size());
-    for (size_t l = 0; l < lobe.responses.size(); ++l) {
-      weights[l] = std::max(weights[l], std::abs(lobe.responses[l]));
+// By Parseval a level's rms error is the root of sum_l (h_l b_l)^2, b_l the error of a band.
+int row_points(int height, std::span<const LobePlan> lobes, const ShNeed& sh) {
+  constexpr int kMostPoints = 16;
+  for (int points = 1; points < kMostPoints; ++points) {
+    bool enough = sh.bands == 0 || row_band_error(points, sh.bands - 1, height) <= sh.error;
+    for (size_t i = 0; i < lobes.size() && enough; ++i) {
+      double squares = 0;
+      for (size_t l = 1; l < lobes[i].responses.size(); ++l) {
+        const double error = row_band_error(points, static_cast<int>(l), height);
+        squares += error * error * lobes[i].responses[l] * lobes[i].responses[l];
+      }
+      enough = std::sqrt(squares) <= lobes[i].row_error;
     }
+    if (enough) return points;
   }
-  const int points = row_gauss_points(environment.radiance.height, weights, 1e-8);
-  return project_latlong(environment.radiance, static_cast<int>(weights.size()), points, threads,
-                         progress);
+  return kMostPoints;
+}
+
+LatlongSpectrum project_for(const Environment& environment, std::span<const LobePlan> lobes,
+                            const ShNeed& sh, int threads, Progress& progress) {
+  int bands = std::max(1, sh.bands);
+  for (const LobePlan& lobe : lobes) {
+    bands = std::max(bands, static_cast<int>(lobe.responses.size()));
+  }
+  const int points = row_points(environment.radiance.height, lobes, sh);
+  return project_latlong(environment.radiance, bands, points, threads, progress);
 }
 
 namespace {
@@ -51,7 +65,9 @@ Image convolve_lobe(const Environment& environment, const LightStatistics& light
                                convolution_longitudes(lobe.bands), threads, progress),
               {},
               {}};
-  if (lobe.corrected) parts.cut.emplace(light, *make_kernel(lobe.lobe), lobe.responses);
+  if (lobe.corrected) {
+    parts.cut.emplace(light, *make_kernel(lobe.lobe), lobe.responses, lobe.cell_phase);
+  }
   if (lobe.split > 0) {
     parts.near.emplace(environment.radiance, lobe.lobe.alpha, lobe.split, lobe.tolerance);
   }

@@ -25,9 +25,11 @@ struct LobePlan {
   Lobe lobe;
   int bands = 0;                  // of the map that enter
   bool corrected = false;         // bright texels get what the band limit cuts off, in closed form
+  double cell_phase = 0;          // how finely those are cut for it (see CutLight)
   double split = 0;               // above 0: the core is left to the map's texels (see GgxHalo)
   double tolerance = 0;           // of the core, relative; 0 without a core
   std::vector<double> responses;  // h_l for l < bands, of the lobe or of its halo
+  double row_error = 0;           // what the map's rows may be summed to, part of error_bound
   double error_bound = 0;         // rms over the sphere, relative to the mean
   double uncorrected_bound = 0;   // what it would be without the correction
   // The truth lies in the map's range, so that results are cut back into it.
@@ -36,13 +38,16 @@ struct LobePlan {
 // The fewest bands whose bound stays at or under `target` (relative rms). Where no allowed number
 // does, the most are taken, and error_bound, then above `target`, says what that gives.
 inline constexpr int kMaxBands = 1400;
-// GGX lobes that would need more bands than these are split.
+// GGX lobes that would need more bands than these, or than a halo of this map, are split. Charlie's
+// ring cannot be; it makes do with the bands that kDearTargets times the target takes, since time
+// grows with their cube.
 inline constexpr int kSplitBands = 800;
+inline constexpr double kDearTargets = 2.5;
 LobePlan plan_lobe(const LightStatistics& light, const Lobe& lobe, double target);
 
 // The first `bands` bands of irradiance over pi and no more, as engines keep them: below 0 in
-// places where a map's light is hard.
-LobePlan plan_irradiance_bands(const LightStatistics& light, int bands);
+// places where a map's light is hard. `target` orders how exactly those are known.
+LobePlan plan_irradiance_bands(const LightStatistics& light, int bands, double target);
 // What the first `bands` bands of irradiance lack: rms over the sphere, and a bound on it in any
 // direction, relative to the mean. `spectrum` holds at least as many bands.
 struct OmittedLight {
@@ -56,9 +61,17 @@ OmittedLight omitted_irradiance(const LightStatistics& light, const LatlongSpect
 int convolution_rings(int bands);
 int convolution_longitudes(int bands);
 
-// The map's coefficients for all `lobes` and for `sh_bands` bands at full accuracy.
+// What coefficients serve beside lobes: themselves. Each errs by at most `error` of L00.
+struct ShNeed {
+  int bands;
+  double error;
+  ShNeed(int bands_ = 0, double error_ = 1e-8) : bands(bands_), error(error_) {}
+};
+// The fewest Gauss points per row of a map of `height` rows that all needs are met with.
+int row_points(int height, std::span<const LobePlan> lobes, const ShNeed& sh);
+// The map's coefficients for all of them.
 LatlongSpectrum project_for(const Environment& environment, std::span<const LobePlan> lobes,
-                            int sh_bands, int threads, Progress& progress);
+                            const ShNeed& sh, int threads, Progress& progress);
 
 // What convolve_lobe() cut back into the range that the map spans; the truth lies inside it.
 struct RangeReport {

@@ -41,6 +41,9 @@ int first_under(const std::vector<double>& tails, double limit) {
   return -1;
 }
 
+// What summing the map's rows may add to a level.
+constexpr double kRowShare = 0.02;  // of the target
+
 struct BandChoice {
   int bands = 0;
   bool corrected = false;
@@ -94,10 +97,11 @@ LobePlan plan_split(const LightStatistics& light, const Lobe& lobe, double targe
       band_responses(GgxHalo(lobe.alpha, plan.split), plan.bands + 64);
   plan.responses.assign(responses.begin(), responses.begin() + plan.bands);
   const double cut = response_tails(responses)[static_cast<size_t>(plan.bands)] * light.spread;
+  plan.row_error = kRowShare * target;
   const double norm = NearField::kNormFactor * (1 + light.spread);
   plan.tolerance = std::clamp(0.4 * target / norm, kSmallestTolerance, NearField::kWorstTolerance);
-  plan.error_bound =
-      cut + interpolation_bound(light, responses, plan.bands) + norm * plan.tolerance;
+  plan.error_bound = cut + interpolation_bound(light, responses, plan.bands) +
+                     norm * plan.tolerance + plan.row_error;
   plan.uncorrected_bound = plan.error_bound;
   return plan;
 }
@@ -115,43 +119,73 @@ int convolution_longitudes(int bands) {
   return result;
 }
 
-static LobePlan plan_banded(const LightStatistics& light, const Lobe& lobe, double target) {
+namespace {
+
+constexpr int kDearBands = 320;
+
+LobePlan plan_banded(const LightStatistics& light, const Lobe& lobe, double target) {
   const std::unique_ptr<ZonalKernel> kernel = make_kernel(lobe);
   const std::vector<double> responses = band_responses(*kernel, response_count(lobe.alpha));
   const std::vector<double> tails = response_tails(responses);
   BandChoice choice = choose_bands(light, tails, target);
+  double phase = 0;
   const auto total_bound = [&](bool corrected) {
     const double cut =
         tails[static_cast<size_t>(choice.bands)] * (corrected ? light.rest_spread : light.spread);
-    return cut + interpolation_bound(light, responses, choice.bands) +
-           (corrected ? cut_light_bound(light, responses, choice.bands) : 0.0);
+    return cut + interpolation_bound(light, responses, choice.bands) + kRowShare * target +
+           (corrected ? cut_light_bound(light, *kernel, responses, choice.bands, phase) : 0.0);
+  };
+  const auto choose_phase = [&] {
+    if (!choice.corrected) return;
+    phase = cut_light_phase(light, *kernel, responses, choice.bands, kPhaseShare * target);
   };
   const int most = static_cast<int>(responses.size()) - 1;
+  choose_phase();
   while (total_bound(choice.corrected) > target && choice.bands < most) {
     choice.bands = std::min(most, choice.bands + choice.bands / 8 + 1);
+    choose_phase();
+  }
+  // The part granted was small for the sake of single texels; where bands are dear, no more of them
+  // are taken than the whole target asks for.
+  if (total_bound(choice.corrected) <= target) {
+    for (int under = kDearBands, over = choice.bands; over - under > 8;) {
+      choice.bands = (under + over) / 2;
+      choose_phase();
+      (total_bound(choice.corrected) <= target ? over : under) = choice.bands;
+      choice.bands = over;
+    }
+    choose_phase();
   }
   LobePlan plan;
   plan.lobe = lobe;
   plan.bands = choice.bands;
   plan.corrected = choice.corrected;
+  plan.cell_phase = phase;
+  plan.row_error = kRowShare * target;
   plan.responses.assign(responses.begin(), responses.begin() + choice.bands);
   plan.error_bound = total_bound(choice.corrected);
   plan.uncorrected_bound = total_bound(false);
   return plan;
 }
 
+}  // namespace
+
 LobePlan plan_lobe(const LightStatistics& light, const Lobe& lobe, double target) {
   const LobePlan plan = plan_banded(light, lobe, target);
-  if (lobe.kind == LobeKind::charlie || plan.bands <= kSplitBands) return plan;
+  if (plan.bands <= std::min(kSplitBands, halo_bands(light))) return plan;
+  if (lobe.kind == LobeKind::charlie)
+    return plan.bands <= kSplitBands ? plan : plan_banded(light, lobe, kDearTargets * target);
   return plan_split(light, lobe, target);
 }
 
-LobePlan plan_irradiance_bands(const LightStatistics& light, int bands) {
+LobePlan plan_irradiance_bands(const LightStatistics& light, int bands, double target) {
   LobePlan plan;
   plan.lobe = {LobeKind::ggx, 1};
   plan.bands = bands;
   for (int l = 0; l < bands; ++l) plan.responses.push_back(clamped_cosine_band(l) / kPi);
-  plan.error_bound = plan.uncorrected_bound = interpolation_bound(light, plan.responses, bands);
+  plan.row_error = kRowShare * target;
+  plan.error_bound = plan.uncorrected_bound =
+      interpolation_bound(light, plan.responses, bands) + plan.row_error;
   plan.within_range = false;
   return plan;
 }

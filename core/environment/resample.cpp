@@ -1,8 +1,13 @@
-// Solid angle is d(longitude) d(cos theta). A narrow strip of longitudes inside one column of the
-// map is walked from pole to pole: every border of a cube texel and of a map row that it crosses is
-// a value of y = cos theta, so a cell's share of the strip is a sum of radiance times differences
-// of y. The strips tile the sphere and each strip's cells tile the strip: nothing is lost between
-// cells.
+// Solid angle is d(longitude) d(y), y = cos theta. With S(phi, y) the integral of a column's
+// radiance from the pole down to y, the energy of a cell is the integral of S dphi around its
+// border (Green's theorem): its share of the map is known from curves alone, and meridians add
+// nothing.
+//
+// Every other line of a cube's grid is a great circle, tan(latitude) = A cos b, b the longitude
+// from its summit. Along it y = A cos b / sqrt(1 + A^2 cos^2 b), whose integral is
+//   E(b) = asin(k sin b),  k = A / sqrt(1 + A^2),
+// and inside one texel of the map S = Q - L y, so that a piece of line gives Q db - L dE: no point
+// is sampled, and nothing but rounding is lost.
 
 #include "core/environment/resample.h"
 
@@ -13,214 +18,319 @@
 #include <vector>
 
 #include "core/base/parallel.h"
+#include "core/sphere/solid_angle.h"
 
 namespace lightkiln {
 
 namespace {
 
-// Faces around the equator with the u of their centres; u grows with s on all four.
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+// Faces around the equator with the u of their centres; u grows with s on all four. A pole face is
+// made of four sectors, each below one of them.
 struct SideFace {
   int face;
   double centre;
 };
 constexpr std::array<SideFace, 4> kSides = {{{0, 0.25}, {1, 0.75}, {4, 0.5}, {5, 1.0}}};
 
-// A strip of longitudes seen from its side face: angles `begin` < `end` off the face's centre.
-struct Strip {
-  double begin, end;
-  int column;  // of the map
-};
-
-struct Sums {
-  Vec3d energy;
-  double omega = 0;
-};
-
-// Walks one column of the map away from a pole: y = |cos theta| falls from 1, and on to -1 when the
-// whole meridian is walked. From the south pole the rows are read upwards.
-class ColumnWalk {
- public:
-  ColumnWalk(const Image& map, const std::vector<double>& row_edges, int column, bool from_south)
-      : map_(map), edges_(row_edges), column_(column), from_south_(from_south) {}
-
-  void start(double y) {
-    const auto below = std::upper_bound(edges_.begin(), edges_.end(), y, std::greater<>());
-    row_ = std::clamp(static_cast<int>(below - edges_.begin()) - 1, 0, map_.height - 1);
-    y_ = y;
-  }
-  // Adds the part from the present place to `y`, times `width` of longitude.
-  void advance(double y, double width, Sums* sums) {
-    if (y >= y_) return;
-    sums->omega += width * (y_ - y);
-    while (row_ + 1 < map_.height && edges_[static_cast<size_t>(row_) + 1] > y) {
-      const double edge = edges_[static_cast<size_t>(row_) + 1];
-      sums->energy += radiance() * (width * (y_ - edge));
-      y_ = edge;
-      ++row_;
-    }
-    sums->energy += radiance() * (width * (y_ - y));
-    y_ = y;
-  }
-
- private:
-  Vec3d radiance() const {
-    return to_double(map_.rgb(column_, from_south_ ? map_.height - 1 - row_ : row_));
-  }
-
-  const Image& map_;
-  const std::vector<double>& edges_;
-  int column_;
-  bool from_south_;
-  int row_ = 0;
-  double y_ = 1;
-};
-
-// Strips of texel column i of a side face: cut where the map's columns change and into pieces no
-// wider than `widest`.
-std::vector<Strip> strips(const SideFace& side, int i, int size, int width, double widest) {
-  const double begin = std::atan(2.0 * i / size - 1), end = std::atan(2.0 * (i + 1) / size - 1);
-  const auto column_of = [&](double angle) { return (side.centre + angle / (2 * kPi)) * width; };
-  std::vector<Strip> result;
-  double from = begin;
-  // A border that coincides with the texel's own makes an empty strip, which is left out.
-  for (int k = static_cast<int>(std::floor(column_of(begin))); from < end; ++k) {
-    const double border = ((k + 1.0) / width - side.centre) * 2 * kPi;
-    const double to = std::min(end, border);
-    if (to - from < 1e-13) {
-      if (to >= end) break;
-      continue;
-    }
-    const int pieces = std::max(1, static_cast<int>(std::ceil((to - from) / widest)));
-    for (int piece = 0; piece < pieces; ++piece) {
-      const double a = from + (to - from) * piece / pieces;
-      const double b = from + (to - from) * (piece + 1) / pieces;
-      result.push_back({a, b, ((k % width) + width) % width});
-    }
-    from = to;
-  }
-  return result;
-}
-
-// The mean over a strip [b0, b1] of y on the line tan(latitude) = slope cos(b), an edge of a side
-// face, is (F(b1) - F(b0)) / (b1 - b0) with
-//   F(b) = integral slope cos b / sqrt(1 + slope^2 cos^2 b) db = asin(k sin b),
-//   k = slope / sqrt(1 + slope^2).
-double edge_integral(double slope, double b) {
-  return std::asin(slope / std::sqrt(1 + slope * slope) * std::sin(b));
-}
-double mean_edge(double slope, const Strip& strip) {
-  return (edge_integral(slope, strip.end) - edge_integral(slope, strip.begin)) /
-         (strip.end - strip.begin);
-}
-
-void write(const Sums& sums, float* out) {
-  for (int c = 0; c < 3; ++c) out[c] = static_cast<float>(sums.energy[c] / sums.omega);
-}
-
-struct Task {
+// What all cells share. Rows are counted from the pole that S starts at; borders of rows lie
+// symmetrically about the equator.
+struct Grid {
   const Image& map;
   int size;
-  std::vector<double> row_edges;  // cos theta, descending, symmetric about 0
+  std::vector<double> y, tangent;  // of the latitude of each row's upper border, height + 1
+
+  Grid(const Image& latlong, int face_size) : map(latlong), size(face_size) {
+    const int height = map.height;
+    for (int row = 0; row <= height; ++row) {
+      const int nearer = std::min(row, height - row);
+      const double theta = kPi * nearer / height, sign = 2 * row <= height ? 1 : -1;
+      const bool equator = 2 * nearer == height;
+      y.push_back(equator ? 0.0 : sign * std::cos(theta));
+      tangent.push_back(nearer == 0 ? sign * kNever
+                        : equator   ? 0.0
+                                    : sign * std::cos(theta) / std::sin(theta));
+    }
+  }
+  int row_of(double latitude_tangent) const {
+    const double theta = kPi / 2 - std::atan(latitude_tangent);
+    return std::clamp(static_cast<int>(theta * map.height / kPi), 0, map.height - 1);
+  }
 };
 
-// Edges are averaged exactly over a strip, so strips need not be narrower than the map's columns.
-void fill_side_column(const Task& task, int i, Image* cube) {
-  const size_t size = static_cast<size_t>(task.size);
-  std::vector<Sums> cells(size);
-  std::vector<double> from(size + 1), to(size + 1);
-  const auto integrals = [&](double b, std::vector<double>& out) {
-    for (size_t j = 0; j <= size; ++j) {
-      out[j] = edge_integral(1 - 2 * static_cast<double>(j) / task.size, b);
-    }
+// S = constant - radiance y inside each texel of some columns, for the rows [first_row, last_row].
+class ColumnSums {
+ public:
+  struct Texel {
+    Vec3d constant, radiance;
   };
-  for (const SideFace& side : kSides) {
-    std::fill(cells.begin(), cells.end(), Sums{});
-    double last = std::numeric_limits<double>::quiet_NaN();
-    for (const Strip& strip : strips(side, i, task.size, task.map.width, kPi)) {
-      if (strip.begin != last) integrals(strip.begin, from);
-      integrals(strip.end, to);
-      const double width = strip.end - strip.begin;
-      ColumnWalk walk(task.map, task.row_edges, strip.column, false);
-      walk.start((to[0] - from[0]) / width);
-      for (size_t j = 0; j < size; ++j) {
-        walk.advance((to[j + 1] - from[j + 1]) / width, width, &cells[j]);
+
+  ColumnSums(const Grid& grid, int first_column, int last_column, int first_row, int last_row,
+             bool from_south)
+      : first_column_(first_column),
+        first_row_(first_row),
+        rows_(last_row - first_row + 1),
+        texels_(static_cast<size_t>(last_column - first_column + 1) * static_cast<size_t>(rows_)) {
+    const int width = grid.map.width, height = grid.map.height;
+    std::vector<Vec3d> above(static_cast<size_t>(last_column - first_column + 1));
+    for (int row = first_row; row <= last_row; ++row) {
+      const double top = grid.y[static_cast<size_t>(row)];
+      const double tall = top - grid.y[static_cast<size_t>(row) + 1];
+      const int line = from_south ? height - 1 - row : row;
+      for (int column = first_column; column <= last_column; ++column) {
+        const int wrapped = ((column % width) + width) % width;
+        const Vec3d radiance = to_double(grid.map.rgb(wrapped, line));
+        Vec3d& sum = above[static_cast<size_t>(column - first_column)];
+        texels_[index(column, row)] = {sum + radiance * top, radiance};
+        sum += radiance * tall;
       }
-      from.swap(to);
-      last = strip.end;
     }
-    for (size_t j = 0; j < size; ++j) {
-      write(cells[j], cube->at(i, side.face * task.size + static_cast<int>(j)));
+  }
+  const Texel& at(int column, int row) const { return texels_[index(column, row)]; }
+
+ private:
+  size_t index(int column, int row) const {
+    return static_cast<size_t>(column - first_column_) * static_cast<size_t>(rows_) +
+           static_cast<size_t>(row - first_row_);
+  }
+
+  int first_column_, first_row_, rows_;
+  std::vector<Texel> texels_;
+};
+
+// A place on a line: its longitude from the side face's centre, and the sine of that from the
+// line's summit.
+struct Place {
+  double longitude, sine;
+};
+
+// A great circle whose summit lies at `summit` of those longitudes.
+struct Line {
+  double height;  // A
+  double summit;
+  double k() const { return height / std::sqrt(1 + height * height); }
+  double tangent(double sine) const { return height * std::sqrt((1 - sine) * (1 + sine)); }
+};
+
+// Column borders of the map as seen from a side face.
+struct Borders {
+  double centre;
+  int width;
+  double longitude(int column) const { return (double(column) / width - centre) * 2 * kPi; }
+  int column_of(double longitude) const {
+    return static_cast<int>(std::floor((longitude / (2 * kPi) + centre) * width));
+  }
+};
+
+// Walks along one side of a line's summit, longitude growing, from `from` over every place of
+// `ends`, and hands add(i, integral of S dphi) of the stretch that ends at ends[i].
+template <typename Ends, typename Add>
+void walk(const Grid& grid, const ColumnSums& sums, const Borders& borders, const Line& line,
+          const Place& from, const Ends& ends, const Add& add) {
+  const double k = line.k();
+  const bool rising = from.longitude < line.summit;  // towards it
+  // Towards the equator rows grow north of it and fall south of it.
+  const int way = (line.height > 0) != rising ? 1 : -1;
+  int row = grid.row_of(line.tangent(from.sine));
+  int column = borders.column_of(from.longitude);
+  double at = from.longitude, integral = std::asin(k * from.sine), next_sine = 0;
+  double next_column = borders.longitude(column + 1);
+  // The crossing of the next row border: A cos b is its tangent. One that the summit does not reach
+  // is never met on the way up; on the way down rounding alone can put it behind the summit.
+  const auto next_row_from = [&](double place) {
+    if (line.height == 0) return kNever;
+    const double ratio = grid.tangent[static_cast<size_t>(row + (way > 0 ? 1 : 0))] / line.height;
+    if (ratio > 1 && !rising) return place;
+    if (!(ratio >= 0 && ratio <= 1)) return kNever;
+    next_sine = (rising ? -1 : 1) * std::sqrt((1 - ratio) * (1 + ratio));
+    return std::max(place, line.summit + (rising ? -1 : 1) * std::acos(ratio));
+  };
+  double next_row = next_row_from(at);
+  for (size_t i = 0; i < ends.size(); ++i) {
+    const Place& end = ends[i];
+    Vec3d sum;
+    for (bool done = false; !done;) {
+      const double to = std::min({next_column, next_row, end.longitude});
+      const double step = to - at;
+      if (step > 0) {
+        const double sine = to == end.longitude ? end.sine
+                            : to == next_row    ? next_sine
+                                                : std::sin(to - line.summit);
+        const double reached = std::asin(k * sine);
+        const ColumnSums::Texel& texel = sums.at(column, row);
+        sum += texel.constant * step - texel.radiance * (reached - integral);
+        integral = reached;
+        at = to;
+      }
+      done = to == end.longitude;
+      if (to == next_column) next_column = borders.longitude(++column + 1);
+      if (to == next_row) {
+        row += way;
+        next_row = next_row_from(at);
+      }
+    }
+    add(i, sum);
+  }
+}
+
+// Beside a bright texel a black one's rounding must not show as a negative.
+void write(const Vec3d& energy, double omega, float* out) {
+  for (int c = 0; c < 3; ++c) out[c] = static_cast<float>(std::max(0.0, energy[c] / omega));
+}
+
+// Texel columns [begin, end) of the four side faces. Line j is tan(latitude) = (1 - 2j/size) cos b.
+void fill_side_columns(const Grid& grid, int begin, int end, Image* cube) {
+  const int size = grid.size;
+  const auto edge = [&](int i) {
+    const double s = 2.0 * i / size - 1;
+    return Place{std::atan(s), s / std::sqrt(1 + s * s)};
+  };
+  std::vector<Vec3d> above(static_cast<size_t>(end - begin)), below = above;
+  const int first_row = std::max(0, grid.row_of(1) - 1);
+  const int last_row = grid.map.height - 1 - first_row;
+  std::vector<Place> ends;
+  for (const SideFace& side : kSides) {
+    const Borders borders{side.centre, grid.map.width};
+    const ColumnSums sums(grid, borders.column_of(edge(begin).longitude) - 1,
+                          borders.column_of(edge(end).longitude) + 1, first_row, last_row, false);
+    for (int j = 0; j <= size; ++j) {
+      const Line line{1 - 2.0 * j / size, 0};
+      std::fill(below.begin(), below.end(), Vec3d{});
+      for (int i = begin; i < end;) {
+        // Up to the summit, or from it on; an odd face has a texel on both sides of it.
+        const bool before = 2 * i < size;
+        ends.clear();
+        int last = i;
+        for (; last < end && (before ? 2 * last < size : true); ++last) {
+          ends.push_back(2 * last + 1 == size && before ? Place{0, 0} : edge(last + 1));
+        }
+        const auto add = [&](size_t n, const Vec3d& integral) {
+          below[static_cast<size_t>(i - begin) + n] += integral;
+        };
+        walk(grid, sums, borders, line, edge(i), ends, add);
+        if (2 * last - 1 == size && before) {
+          const std::array<Place, 1> rest{edge(last)};
+          const size_t middle = static_cast<size_t>(last - 1 - begin);
+          walk(grid, sums, borders, line, {0, 0}, rest,
+               [&](size_t, const Vec3d& integral) { below[middle] += integral; });
+        }
+        i = last;
+      }
+      for (int i = begin; i < end && j > 0; ++i) {
+        const size_t n = static_cast<size_t>(i - begin);
+        write(below[n] - above[n], cube_texel_solid_angle(i, j - 1, size),
+              cube->at(i, side.face * size + j - 1));
+      }
+      above.swap(below);
     }
   }
 }
 
-// Strips on a pole face, per cube texel: cells are told apart at the strip's middle.
-constexpr double kPoleStrip = 0.25;
+// The sector of a pole face below a side face: xi = rho sin b and eta = rho cos b, rho =
+// tan(theta), with |xi| <= eta <= 1. Cells are told by their places along both, as indices of the
+// whole face.
+struct Sector {
+  int size, face;
+  double sine, cosine;  // of the side face's own longitude
 
-// The cells of a pole face along the ray at longitude phi: the ray leaves the centre and crosses
-// grid lines at radii rho = tan theta, in order from two arithmetic sequences.
-struct PoleRay {
-  double step_s, step_t;  // of (2s - 1, 2t - 1) per unit of rho
-  int s, t;               // present cell
-  int size;
-  double next_s, next_t;  // rho of the next crossing
-
-  PoleRay(double phi, bool north, int size_)
-      : step_s(std::sin(phi)), step_t(north ? -std::cos(phi) : std::cos(phi)), size(size_) {
-    s = step_s > 0 ? size / 2 : (size + 1) / 2 - 1;
-    t = step_t > 0 ? size / 2 : (size + 1) / 2 - 1;
-    next_s = crossing(step_s, s);
-    next_t = crossing(step_t, t);
+  Sector(int size_, bool north, const SideFace& side)
+      : size(size_),
+        face(north ? 2 : 3),
+        sine(std::round(std::sin(kPi * (1 - 2 * side.centre)))),
+        cosine(std::round(std::cos(kPi * (1 - 2 * side.centre)))) {}
+  // 2s - 1 = rho sin(phi) and 2t - 1 = -+ rho cos(phi) with phi the side face's longitude less b.
+  size_t cell(int xi, int eta) const {
+    const auto turned = [&](double sign, int i) { return sign > 0 ? i : size - 1 - i; };
+    const double north = face == 2 ? -1 : 1;
+    const int s = cosine != 0 ? turned(-cosine, xi) : turned(sine, eta);
+    const int t = cosine != 0 ? turned(north * cosine, eta) : turned(north * sine, xi);
+    return static_cast<size_t>(t) * static_cast<size_t>(size) + static_cast<size_t>(s);
   }
-  double crossing(double step, int cell) const {
-    if (step == 0) return std::numeric_limits<double>::infinity();
-    const int line = step > 0 ? cell + 1 : cell;
-    return (2.0 * line / size - 1) / step;
-  }
-  // Moves to the next cell and gives the rho at which it begins; *inside says whether it is on
-  // the face.
-  double leave_cell(bool* inside) {
-    if (next_s <= next_t) {
-      const double rho = next_s;
-      s += step_s > 0 ? 1 : -1;
-      next_s = crossing(step_s, s);
-      *inside = s >= 0 && s < size;
-      return rho;
-    }
-    const double rho = next_t;
-    t += step_t > 0 ? 1 : -1;
-    next_t = crossing(step_t, t);
-    *inside = t >= 0 && t < size;
-    return rho;
-  }
+  double grid_line(int i) const { return 2.0 * i / size - 1; }
 };
 
-void fill_pole(const Task& task, bool north, Image* cube, Progress& progress) {
-  const int size = task.size, face = north ? 2 : 3;
-  std::vector<Sums> cells(static_cast<size_t>(size) * static_cast<size_t>(size));
+// Lines of constant eta: A = 1 / eta, summit at b = 0. What lies inside, towards the pole, gets
+// what the line integrates, and what lies outside gives it.
+void walk_eta(const Grid& grid, const ColumnSums& sums, const Borders& borders,
+              const Sector& sector, int j, std::vector<Vec3d>* cells) {
+  const int size = sector.size;
+  const double eta = sector.grid_line(j);
+  const auto place = [&](double xi) {
+    return Place{std::atan(xi / eta), xi / std::sqrt(xi * xi + eta * eta)};
+  };
+  for (const bool before : {true, false}) {
+    std::vector<Place> ends;
+    std::vector<int> columns;
+    const double from = before ? -eta : 0, to = before ? 0 : eta;
+    const int first = static_cast<int>(std::floor((from + 1) / 2 * size + 1e-9));
+    for (int xi = first; sector.grid_line(xi) < to - 1e-12; ++xi) {
+      ends.push_back(place(std::min(to, sector.grid_line(xi + 1))));
+      columns.push_back(xi);
+    }
+    if (ends.empty()) continue;
+    walk(grid, sums, borders, {1 / eta, 0}, place(from), ends,
+         [&](size_t n, const Vec3d& integral) {
+           (*cells)[sector.cell(columns[n], j - 1)] += integral;
+           if (j < size) (*cells)[sector.cell(columns[n], j)] += integral * -1.0;
+         });
+  }
+}
+
+// Lines of constant xi = x: tan(latitude) = sin b / x = cos(b - pi/2) / x, and mirrored for x < 0.
+// Along them eta runs between |x|, on the sector's border, and 1.
+void walk_xi(const Grid& grid, const ColumnSums& sums, const Borders& borders, const Sector& sector,
+             int i, std::vector<Vec3d>* cells) {
+  const int size = sector.size;
+  const double x = sector.grid_line(i), side = x > 0 ? 1 : -1;
+  if (std::abs(x) < 1e-12) return;  // a meridian
+  const Line line{1 / std::abs(x), side * kPi / 2};
+  const auto place = [&](double eta) {
+    return Place{std::atan(x / eta), -side * eta / std::sqrt(x * x + eta * eta)};
+  };
+  std::vector<Place> ends;
+  std::vector<int> rows;
+  const int nearest = static_cast<int>(std::floor((std::abs(x) + 1) / 2 * size + 1e-9));
+  if (x > 0) {  // b grows as eta falls
+    for (int eta = size - 1; eta >= nearest; --eta) {
+      ends.push_back(place(std::max(x, sector.grid_line(eta))));
+      rows.push_back(eta);
+    }
+  } else {
+    for (int eta = nearest; eta < size; ++eta) {
+      ends.push_back(place(sector.grid_line(eta + 1)));
+      rows.push_back(eta);
+    }
+  }
+  const int inside = x > 0 ? i - 1 : i, outside = x > 0 ? i : i - 1;
+  walk(grid, sums, borders, line, place(x > 0 ? 1 : -x), ends,
+       [&](size_t n, const Vec3d& integral) {
+         (*cells)[sector.cell(inside, rows[n])] += integral;
+         (*cells)[sector.cell(outside, rows[n])] += integral * -1.0;
+       });
+}
+
+void fill_pole(const Grid& grid, bool north, Image* cube, Progress& progress) {
+  const int size = grid.size;
+  std::vector<Vec3d> cells(static_cast<size_t>(size) * static_cast<size_t>(size));
+  const int last_row = std::min(grid.map.height - 1, grid.row_of(std::sqrt(0.5)) + 1);
   for (const SideFace& side : kSides) {
-    for (int i = 0; i < size; ++i) {
+    const Borders borders{side.centre, grid.map.width};
+    const ColumnSums sums(grid, borders.column_of(-kPi / 4) - 1, borders.column_of(kPi / 4) + 1, 0,
+                          last_row, !north);
+    const Sector sector(size, north, side);
+    for (int i = 1; i <= size; ++i) {
       if (i % 64 == 0) progress.update(0.5);
-      for (const Strip& strip : strips(side, i, size, task.map.width, kPoleStrip / size)) {
-        const double width = strip.end - strip.begin;
-        const double u = side.centre + 0.5 * (strip.begin + strip.end) / (2 * kPi);
-        PoleRay ray(kPi * (1 - 2 * u), north, size);
-        ColumnWalk walk(task.map, task.row_edges, strip.column, !north);
-        walk.start(1);
-        // The last cell ends where the side face begins.
-        const double rim = mean_edge(1, strip);
-        for (bool inside = true; inside;) {
-          const size_t cell = static_cast<size_t>(ray.t * size + ray.s);
-          const double rho = ray.leave_cell(&inside);
-          const double y = inside ? std::max(rim, 1 / std::sqrt(1 + rho * rho)) : rim;
-          walk.advance(y, width, &cells[cell]);
-        }
-      }
+      if (2 * i > size) walk_eta(grid, sums, borders, sector, i, &cells);
+      if (i < size) walk_xi(grid, sums, borders, sector, i, &cells);
     }
   }
   for (int t = 0; t < size; ++t) {
     for (int s = 0; s < size; ++s) {
-      write(cells[static_cast<size_t>(t * size + s)], cube->at(s, face * size + t));
+      const size_t cell =
+          static_cast<size_t>(t) * static_cast<size_t>(size) + static_cast<size_t>(s);
+      write(cells[cell], cube_texel_solid_angle(s, t, size),
+            cube->at(s, (north ? 2 : 3) * size + t));
     }
   }
 }
@@ -228,23 +338,18 @@ void fill_pole(const Task& task, bool north, Image* cube, Progress& progress) {
 }  // namespace
 
 Image resample_to_cube(const Image& latlong, int face_size, int threads, Progress& progress) {
-  Task task{latlong, face_size, {}};
-  const int height = latlong.height;
-  for (int row = 0; row <= height; ++row) {
-    const int nearer = std::min(row, height - row);
-    const double edge = 2 * nearer == height ? 0.0 : std::cos(kPi * nearer / height);
-    task.row_edges.push_back(2 * row <= height ? edge : -edge);
-  }
+  const Grid grid(latlong, face_size);
   Image cube(face_size, 6 * face_size, 3);
+  constexpr size_t kColumns = 8;
   parallel_blocks(
-      static_cast<size_t>(face_size), 4, threads, progress,
+      static_cast<size_t>(face_size), kColumns, threads, progress,
       [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i) fill_side_column(task, static_cast<int>(i), &cube);
+        fill_side_columns(grid, static_cast<int>(begin), static_cast<int>(end), &cube);
       },
       0.0, 0.5);
   parallel_blocks(
       2, 1, threads, progress,
-      [&](size_t begin, size_t) { fill_pole(task, begin == 0, &cube, progress); }, 0.5, 1.0);
+      [&](size_t begin, size_t) { fill_pole(grid, begin == 0, &cube, progress); }, 0.5, 1.0);
   return cube;
 }
 

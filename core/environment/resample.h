@@ -9,14 +9,13 @@ namespace lightkiln {
 
 // Each texel of the cube (face_size wide, 6 face_size high, faces +X -X +Y -Y +Z -Z) is the mean of
 // the map, as a function that is constant on each of its texels, over the solid angle of the cube's
-// texel. Nothing is skipped and nothing rings: energy is kept and a constant stays exact. Cells are
-// cut into meridian strips no wider than an eighth of a cube texel on the pole faces; what that
-// misplaces at a cell's corners stays under 1 % of the cell. The same bits for any number of
-// threads. `progress` may be told from two threads at once.
+// texel: in closed form, whatever the sizes and however hard the light. Nothing is skipped and
+// nothing rings: energy is kept and a constant stays. The same bits for any number of threads.
+// `progress` may be told from two threads at once.
 Image resample_to_cube(const Image& latlong, int face_size, int threads, Progress& progress);
 
-// What the strips leave, as measured against a sum of points: rms over texels of the relative
-// error.
-inline constexpr double kResampleError = 1e-3;
+// What rounding leaves: of a texel, relative to itself, in float, and beside a far brighter one in
+// the sums of doubles. No order makes it cheaper.
+inline constexpr double kResampleError = 1e-7;
 
 }  // namespace lightkiln

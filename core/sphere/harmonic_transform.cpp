@@ -104,6 +104,25 @@ int row_gauss_points(int height, std::span<const double> weights, double toleran
   }
 }
 
+// The error of a map is the mean of its places' errors, weighted by their light: at most that of
+// the worst place, the row at a pole. There, with x the distance times l and s = sqrt((2l + 1) / 4
+// pi), the terms of m = 0 and m = 1 are s J_0(x) x and sqrt(2) s J_1(x) x; the first that n points
+// over [0, H], H = (l + 1) pi / height, do not integrate are
+//   x^(2n+1) / (4^n n!^2)  and  x^(2n) / (2^(2n-1) (n-1)! n!),
+// and n points lose of x^(2n) H^(2n+1) r, r = n!^4 / ((2n+1) (2n)!^2), and (2n + 1) / 2 times as
+// much, with H once more, of x^(2n+1). Relative to the row, H^2 / 2, and to L00 = 1 / sqrt(4 pi).
+double row_band_error(int points, int l, int height) {
+  const double n = points, phase = (l + 1) * kPi / height;
+  const double log_rule = 4 * std::lgamma(n + 1) - std::log(2 * n + 1) - 2 * std::lgamma(2 * n + 1);
+  const double log_power = log_rule + (2 * n - 1) * std::log(phase);
+  const double odd =
+      std::exp(log_power - (2 * n - 1) * std::log(2.0) - std::lgamma(n) - std::lgamma(n + 1)) *
+      std::sqrt(2.0);
+  const double even = std::exp(log_power - 2 * n * std::log(2.0) - 2 * std::lgamma(n + 1)) * phase *
+                      (2 * n + 1) / 2;
+  return 2 * std::sqrt(2.0 * l + 1) * (odd + even);
+}
+
 LatlongSpectrum project_latlong(const Image& image, int bands, int gauss_points, int threads,
                                 Progress& progress) {
   assert(image.channels == 3 && bands >= 1 && gauss_points >= 1);

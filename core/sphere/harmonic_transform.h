@@ -33,6 +33,11 @@ struct LatlongSpectrum {
 // to the row, times weights[l], stays at or under `tolerance`.
 int row_gauss_points(int height, std::span<const double> weights, double tolerance);
 
+// What that many Gauss points per row leave of band l >= 1: the root of the sum over m of squared
+// errors, relative to L00, for the worst map without negative values (all of its light at one
+// place). `height` rows.
+double row_band_error(int points, int l, int height);
+
 // Coefficients of all bands l < bands, by a Fourier series along each row (texels as boxes: exact)
 // and Legendre functions across rows (`gauss_points` per row). Cost: H W log W + H bands^2. The
 // same bits for any number of threads.

@@ -212,6 +212,80 @@ TEST(EnvironmentMaps, MeasuresItsErrorAgainstTheTwin) {
   EXPECT_EQ(document_of(bake(spec, exr_of(constant_map(2)))).prefilter[1].measured.count, 0u);
 }
 
+// One group of outputs at an order: what is stated, what is seen and what it is priced at.
+struct Ordered {
+  double bound = 0;
+  MeasuredError measured;
+  double price_coarse = 0, price_fine = 0;  // at 0.1 and at 0.001, before the bake
+};
+Ordered at_order(const EnvironmentMapsParameters& parameters, double target) {
+  Spec spec = order(parameters);
+  spec.accuracy.target_error = target;
+  spec.accuracy.check_texels = 4;
+  Plan plan;
+  const Assembly result = bake(spec, exr_of(reference::test_sky(64, 50)), 1, &plan);
+  EXPECT_EQ(result.accuracy.status, AccuracyStatus::exact) << target;
+  Ordered seen;
+  seen.bound = result.accuracy.error_max;
+  const EnvironmentDocument& document = document_of(result);
+  if (document.dfg) seen.measured = document.dfg->measured;
+  if (document.irradiance) seen.measured = document.irradiance->measured;
+  if (document.sh) seen.measured = document.sh_measured;
+  for (const auto* chain : {&document.prefilter, &document.sheen}) {
+    for (const MapDocument& level : *chain)
+      if (level.measured.rms > seen.measured.rms) seen.measured = level.measured;
+  }
+  seen.price_coarse = plan.prices.front().seconds;
+  seen.price_fine = plan.prices.back().seconds;
+  return seen;
+}
+
+// What is ordered is what is kept, of each output, and a finer order states less, errs no more and
+// costs more: orders are not decoration.
+TEST(EnvironmentMaps, KeepEveryOrderAndPriceItByWhatItTakes) {
+  EnvironmentMapsParameters dfg, irradiance, chain, sheen, sh;
+  dfg.dfg = DfgOutput{.size = 32, .charlie = true};
+  irradiance.irradiance = IrradianceOutput{.size = 8, .method = IrradianceMethod::exact};
+  chain.prefilter = PrefilterOutput{.size = 16, .levels = 3};
+  sheen.sheen = PrefilterOutput{.size = 16, .levels = 2};
+  sheen.sheen->roughness_scale = RoughnessScale::custom;
+  sheen.sheen->roughness = {0.4, 1};
+  sh.sh = ShOutput{9};
+  for (const auto* parameters : {&dfg, &irradiance, &chain, &sheen, &sh}) {
+    const Ordered coarse = at_order(*parameters, 0.1), fine = at_order(*parameters, 1e-3);
+    for (const auto& [seen, target] : {std::pair{coarse, 0.1}, {fine, 1e-3}}) {
+      EXPECT_LE(seen.bound, target);
+      EXPECT_LE(seen.measured.rms, seen.bound);
+      EXPECT_LE(seen.measured.max, target);
+    }
+    EXPECT_LE(fine.bound, (parameters == &sh ? 1 : 0.2) * coarse.bound);
+    // Nine bands of a small map are one pass over it at any order, and more points a row at a
+    // finer.
+    const double least = parameters == &sh ? 1 : 1.3;
+    EXPECT_GE(fine.price_fine, least * fine.price_coarse) << parameters - &dfg;
+  }
+}
+
+// The default order's coefficients err by at most 1e-6 of L00, and a table of 1e-5 by at most that.
+TEST(EnvironmentMaps, KeepTheFiguresOfCoefficientsAndTables) {
+  EnvironmentMapsParameters parameters;
+  parameters.sh = ShOutput{3};
+  Spec spec = order(parameters);
+  spec.accuracy.check_texels = 9;
+  const auto sky = exr_of(reference::test_sky(256, 1e5));
+  const EnvironmentDocument document = document_of(bake(spec, sky));
+  EXPECT_LE(document.sh->error, 1e-6);
+  EXPECT_LE(document.sh_measured.max, document.sh->error);
+  EnvironmentMapsParameters table;
+  table.dfg = DfgOutput{.size = 64, .charlie = true};
+  spec = order(table);
+  spec.accuracy.target_error = 1e-5;
+  spec.accuracy.check_texels = 64;
+  const EnvironmentDocument exact = document_of(bake(spec, sky));
+  EXPECT_LE(exact.dfg->error_bound, 1e-5);
+  EXPECT_LE(exact.dfg->measured.max, exact.dfg->error_bound);
+}
+
 TEST(MapsOutput, IsSuspiciousWhenWhatIsSeenBreaksWhatWasPromised) {
   ChunkReport report;
   Round round;

@@ -1,5 +1,7 @@
 #include "core/environment/brute_force.h"
 
+#include <array>
+
 #include <gtest/gtest.h>
 
 #include "core/environment/charlie_lobe.h"
@@ -83,9 +85,17 @@ TEST(BruteForce, ProjectsOneCoefficientAtATime) {
 
 TEST(BruteForce, AveragesATexelOfACube) {
   const Environment sky = sky_of(32, 10);
-  const Vec3d ours = texel_average(sky, 2, 1, 3, 4);
-  const Vec3d theirs = reference::cube_texel_mean(sky.radiance, 2, 1, 3, 4, 333);
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(ours[c] / theirs[c], 1, 2e-3);
+  // A side, a corner of the pole face, the pole inside a texel and on its corner.
+  for (const auto& [face, x, y, size] :
+       {std::array{0, 1, 3, 4}, {2, 0, 0, 4}, {2, 1, 1, 3}, {3, 1, 2, 4}, {5, 3, 1, 4}}) {
+    const Vec3d ours = texel_average(sky, face, x, y, size);
+    const Vec3d theirs = reference::cube_texel_mean(sky.radiance, face, x, y, size, 777);
+    const Vec3d finer = texel_average(sky, face, x, y, size, 512);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(ours[c] / theirs[c], 1, 1e-3) << face;
+      EXPECT_NEAR(ours[c] / finer[c], 1, 1e-5) << face;
+    }
+  }
 }
 
 }  // namespace

@@ -266,5 +266,47 @@ TEST(HarmonicTransform, GivesTheSameBitsForAnyNumberOfThreads) {
   }
 }
 
+// The bound against every row's own quadrature, for light at one place of it: what n points leave
+// of y_lm sin(theta) over the row, by band, against forty.
+TEST(RowBandError, HoldsForTheWorstPlaceOfAMap) {
+  const GaussRule fine = gauss_legendre(40);
+  for (const auto& [height, l] : {std::pair{512, 1},
+                                  {512, 2},
+                                  {1024, 2},
+                                  {64, 8},
+                                  {512, 64},
+                                  {1024, 128},
+                                  {256, 128},
+                                  {512, 300}}) {
+    for (int points = 1; points <= 4; ++points) {
+      const GaussRule rule = gauss_legendre(points);
+      const double step = kPi / height;
+      const auto integral = [&](const GaussRule& r, int row, int m) {
+        double sum = 0;
+        for (size_t i = 0; i < r.nodes.size(); ++i) {
+          const double theta = (row + 0.5 + 0.5 * r.nodes[i]) * step;
+          sum += 0.5 * step * r.weights[i] * std::sin(theta) *
+                 std::sph_legendre(static_cast<unsigned>(l), static_cast<unsigned>(m), theta);
+        }
+        return sum;
+      };
+      double worst = 0;
+      for (const int row : {0, 1, 2, height / 8, height / 4, height / 2 - 1}) {
+        const double omega = std::cos(row * step) - std::cos((row + 1) * step);
+        double squares = 0;
+        for (int m = 0; m <= l; ++m) {
+          const double error = integral(rule, row, m) - integral(fine, row, m);
+          squares += (m > 0 ? 2 : 1) * error * error;
+        }
+        worst = std::max(worst, std::sqrt(squares) / omega * std::sqrt(4 * kPi));
+      }
+      const double bound = row_band_error(points, l, height);
+      EXPECT_LE(worst, bound + 1e-12) << height << " " << l << " " << points;
+      if (bound < 1e-10) continue;  // rounding
+      EXPECT_GE(worst, 0.1 * bound) << height << " " << l << " " << points;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace lightkiln
