@@ -74,23 +74,21 @@ uint32_t CubeSampling::slot_of(const Vec3d& direction) const {
   return slot_by_texel_.empty() ? texel : slot_by_texel_[texel];
 }
 
-CubeSampling::Sighting CubeSampling::look(bool lamp, uint64_t replicate, uint32_t index,
+CubeSampling::Sighting CubeSampling::look(Sight sight, uint64_t replicate, uint32_t index,
                                           RayCounters& counters) const {
-  const auto set =
-      static_cast<uint64_t>(lamp ? DimensionSet::probe_lamp : DimensionSet::probe_glare);
+  const auto set = static_cast<uint64_t>(dimensions_of(sight));
   const uint64_t key = hash_combine(hash_combine(key_, replicate), set);
   const auto density = [this](const Vec3& direction) {
     return first_density(to_double(direction));
   };
-  const DirectLight light = lamp ? scene_.lamp(origin_, sobol4(key, index), density, counters)
-                                 : scene_.glare(origin_, sobol2(key, index), density, counters);
+  const DirectLight light = scene_.look(sight, origin_, sobol4(key, index), density, counters);
   if (!(light.radiance.x + light.radiance.y + light.radiance.z > 0)) return {};
   return {slot_of(to_double(light.direction)), light};
 }
 
 // Searches in parallel, adds in order. A light of weight w found within a texel counts like one of
 // its n points: L w to its sum, and L w A J y / n to the harmonics, its share of the integral.
-void CubeSampling::look_directly(bool lamp, uint32_t from, uint32_t to, Progress& progress,
+void CubeSampling::look_directly(Sight sight, uint32_t from, uint32_t to, Progress& progress,
                                  double done, RayCounters* counters,
                                  std::vector<Vec3d>* harmonics) {
   constexpr size_t kWave = 1 << 16, kBlock = 1 << 12;
@@ -108,7 +106,7 @@ void CubeSampling::look_directly(bool lamp, uint32_t from, uint32_t to, Progress
           for (size_t i = begin; i < end; ++i) {
             const size_t number = first + i;
             const auto index = static_cast<uint32_t>(kDirectPerSample * from + number % each);
-            found[i] = look(lamp, number / each, index, counted[begin / kBlock]);
+            found[i] = look(sight, number / each, index, counted[begin / kBlock]);
           }
         },
         done, done);
@@ -139,7 +137,8 @@ void CubeSampling::sample_texel(size_t i, uint32_t from, uint32_t to, Progress& 
   const uint64_t texel_key = hash_combine(key_, order_.texels[i]);
   Texel& slot = slots_[i];
   TexelHarmonics harmonics(place, order_.size, bands_);
-  const bool looks = scene_.has_glare() || scene_.has_lamps();
+  const bool looks = std::any_of(std::begin(kSights), std::end(kSights),
+                                 [this](Sight sight) { return scene_.has(sight); });
   for (uint64_t r = 0; r < replicates_; ++r) {
     progress.check();
     const uint64_t key = hash_combine(texel_key, r);
@@ -194,9 +193,9 @@ Round CubeSampling::advance(Progress& progress, double progress_begin, double pr
       for (size_t c = 0; c < fresh.size(); ++c) fresh[c] += block.harmonics[c];
     }
   }
-  for (const bool lamp : {false, true}) {
-    if (!(lamp ? scene_.has_lamps() : scene_.has_glare())) continue;
-    look_directly(lamp, from, to, progress, progress_end, &counters, &fresh);
+  for (const Sight sight : kSights) {
+    if (!scene_.has(sight)) continue;
+    look_directly(sight, from, to, progress, progress_end, &counters, &fresh);
   }
   const double old_share = static_cast<double>(from) / to;
   for (size_t c = 0; c < fresh.size(); ++c) {

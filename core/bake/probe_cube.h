@@ -7,10 +7,11 @@
 // but for noise; a constant gives its exact coefficients. Every number is a pure function of (key,
 // texel, replicate, index).
 //
-// Points in texels may all miss a sun or a small lamp that the probe sees itself, and then show no
-// variance either. So these are looked for as well (RadianceScene::glare, lamp), kDirectPerSample
-// times for each sample of a texel, and both ways are combined by their densities. The number is
-// small, so that light which spans many texels is left to the points in texels, which are even.
+// Points in texels may all miss a sun, a small lamp, a small unlit object or a small patch of light
+// that the probe sees itself, and then show no variance either. So these are looked for as well
+// (RadianceScene::look), each kind kDirectPerSample times for each sample of a texel, and both ways
+// are combined by their densities. The number is small, so that light which spans many texels is
+// left to the points in texels, which are even.
 
 #include <cstdint>
 #include <vector>
@@ -82,8 +83,8 @@ class CubeSampling {
 
   float first_density(const Vec3d& direction) const;
   uint32_t slot_of(const Vec3d& direction) const;
-  Sighting look(bool lamp, uint64_t replicate, uint32_t index, RayCounters& counters) const;
-  void look_directly(bool lamp, uint32_t from, uint32_t to, Progress& progress, double done,
+  Sighting look(Sight sight, uint64_t replicate, uint32_t index, RayCounters& counters) const;
+  void look_directly(Sight sight, uint32_t from, uint32_t to, Progress& progress, double done,
                      RayCounters* counters, std::vector<Vec3d>* harmonics);
   void sample_texel(size_t i, uint32_t from, uint32_t to, Progress& progress, Block* block);
 

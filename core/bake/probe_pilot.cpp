@@ -34,13 +34,10 @@ double reference_sample(const RadianceScene& scene, const Vec3& origin, const Ve
     return hash_combine(key, static_cast<uint64_t>(name));
   };
   Vec3 sum = scene.sample({origin, direction}, key, index, counters, kDensity);
-  if (scene.has_glare()) {
-    const Point2 u = sobol2(set(DimensionSet::probe_glare), index);
-    sum += scene.glare(origin, u, density, counters).radiance;
-  }
-  if (scene.has_lamps()) {
-    const Point4 u = sobol4(set(DimensionSet::probe_lamp), index);
-    sum += scene.lamp(origin, u, density, counters).radiance;
+  for (const Sight sight : kSights) {
+    if (!scene.has(sight)) continue;
+    const Point4 u = sobol4(set(dimensions_of(sight)), index);
+    sum += scene.look(sight, origin, u, density, counters).radiance;
   }
   return luminance(to_double(sum));
 }

@@ -51,7 +51,10 @@ enum class DimensionSet : uint64_t {
   probe_pilot = 17,
   probe_glare = 18,
   probe_lamp = 19,
+  probe_unlit = 20,
+  probe_patch = 21,
   path_base = 64,  // path_base + 4 * bounce + {0 scatter, 1 environment, 2 emissive, 3 punctual}
+  path_patch = 1024,  // path_patch + bounce
 };
 
 }  // namespace lightkiln

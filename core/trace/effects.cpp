@@ -157,6 +157,22 @@ class Decision {
                   bounds_.punctual(kind));
       }
     }
+    patches();
+  }
+
+  void patches() {
+    double least = INFINITY;
+    for (const int kind : {static_cast<int>(LightKind::point), static_cast<int>(LightKind::spot)}) {
+      const EffectReason& light =
+          plan_.reasons[plan_.reasons.size() - 3 + static_cast<size_t>(kind)];
+      if (light.active) least = std::min(least, survey_.punctual[kind].least_patch);
+    }
+    const bool small = least < kSmallPatch;
+    add("punctual_patches", small,
+        small ? "A point or spot light shines on about " + short_number(100 * least) +
+                    " % of the area, so paths start there too; this lowers noise only."
+              : "No point or spot light shines on a small patch alone.",
+        0);
   }
 
   void emitters() {
@@ -169,11 +185,13 @@ class Decision {
         "emissive_surfaces",
         "Surfaces of " + percent(survey_.emissive_area, survey_.area) + " of the area emit light",
         bounds_.emissive());
-    const bool sampled = plan_.reasons.back().active && 2 * survey_.emissive_area < survey_.area;
+    // Emitters count by what they emit next to the brightest: a hot spot is small on a dim wall.
+    const double as_bright = survey_.emissive_power / survey_.max_emission;
+    const bool sampled = plan_.reasons.back().active && 2 * as_bright < survey_.area;
     add("emissive_sampling", sampled,
         !plan_.reasons.back().active ? "No surface emits light that counts."
         : sampled ? "Emitters are few, so shadow rays look for them; this lowers noise only."
-                  : "Emitters cover at least half of the area: paths meet them unaided.",
+                  : "Emitters cover at least half of the area evenly: paths meet them unaided.",
         0);
   }
 
@@ -283,6 +301,8 @@ EffectSelection selection_of(const std::vector<EffectReason>& reasons, int max_b
   selection.emissive = on("emissive_surfaces");
   selection.emissive_sampling = on("emissive_sampling");
   for (int kind = 0; kind < 3; ++kind) selection.punctual[kind] = on(punctual_name(kind));
+  selection.unlit = on("unlit");
+  selection.punctual_patches = on("punctual_patches");
   selection.textures = on("textures");
   selection.vertex_colors = on("vertex_colors");
   selection.alpha_test = on("alpha_test");

@@ -26,6 +26,9 @@ inline constexpr double kBoundCeiling = 1e6;
 inline constexpr double kNegligibleShare = 0.02;
 // Bounces end where what lies behind them is under this share of the ordered error.
 inline constexpr double kTruncationShare = 0.1;
+// A point or spot light that shines on less than this share of all area is followed to where it
+// shines: paths that meet the patch by chance are too few to tell that they missed it.
+inline constexpr double kSmallPatch = 1.0 / 64;
 // What both leave out together at the most: five kinds of light, and late bounces. An order whose
 // bias cannot be kept under it (see EffectPlan::bias_bound) says so in a warning.
 inline constexpr double kBiasShare = 5 * kNegligibleShare + kTruncationShare;
@@ -42,7 +45,9 @@ struct EffectSelection {
   bool environment_sampling = false;  // importance sampling; off for a constant environment
   bool emissive = false;
   bool emissive_sampling = false;  // off where emitters cover so much that paths meet them anyway
+  bool unlit = false;  // unlit surfaces are looked for, as the sun and lamps are
   bool punctual[3] = {false, false, false};  // by LightKind
+  bool punctual_patches = false;  // paths also start at lights that shine on little (kSmallPatch)
   bool textures = false;
   bool vertex_colors = false;
   bool alpha_test = false;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/base/pinned_math.h"
 #include "core/image/ldr.h"
 #include "core/scene/normals.h"
 #include "core/trace/texture.h"
@@ -76,6 +77,7 @@ MeshSurvey survey_mesh(const Scene& scene, const SurfaceMesh& mesh, const Materi
   }
   survey.max_albedo = material.unlit ? Vec3d{} : clamp_unit(largest);
   survey.mean_albedo = material.unlit ? Vec3d{} : clamp_unit(mean);
+  if (material.unlit) survey.mean_shown = clamp_unit(mean);
   survey.alpha_tested = needs_alpha_test(scene, mesh);
   if (!material.unlit) {
     survey.mean_emission = survey.max_emission = to_double(material.emissive);
@@ -122,9 +124,42 @@ double nearest_surface(const Scene& scene, const Vec3d& point) {
   return nearest;
 }
 
+// The distance along a unit direction to the first triangle; infinite when none is met (Moeller and
+// Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997).
+double surface_along(const Scene& scene, const Vec3d& point, const Vec3d& direction) {
+  double nearest = INFINITY;
+  for (const SurfaceMesh& mesh : scene.meshes) {
+    for (const auto& t : mesh.triangles) {
+      const Vec3d a = to_double(mesh.positions[t[0]]);
+      const Vec3d ab = to_double(mesh.positions[t[1]]) - a,
+                  ac = to_double(mesh.positions[t[2]]) - a;
+      const Vec3d p = cross(direction, ac), from = point - a;
+      const double determinant = dot(ab, p);
+      if (determinant == 0) continue;
+      const double u = dot(from, p) / determinant;
+      const Vec3d q = cross(from, ab);
+      const double v = dot(direction, q) / determinant, distance = dot(ac, q) / determinant;
+      if (u >= 0 && v >= 0 && u + v <= 1 && distance > 0) nearest = std::min(nearest, distance);
+    }
+  }
+  return nearest;
+}
+
+// About what a point or a spot light shines on: the solid angle of its cone at the distance where
+// that meets something.
+double patch_area(const Scene& scene, const PunctualLight& light, const Vec3d& point,
+                  double nearest) {
+  if (light.kind == LightKind::point) return 4 * kPi * nearest * nearest;
+  const double along = surface_along(scene, point, light.direction);
+  const double distance = along < INFINITY ? along : nearest;
+  return 2 * kPi * (1 - pinned_sin_cos(light.outer_cone_rad).cos) * distance * distance;
+}
+
 void survey_punctual(const Scene& scene, LightSurvey* survey) {
   uint64_t looked_at = 0;
-  for (const PunctualLight& light : scene.lights) {
+  survey->patches.assign(scene.lights.size(), INFINITY);
+  for (size_t i = 0; i < scene.lights.size(); ++i) {
+    const PunctualLight& light = scene.lights[i];
     const double intensity = luminance(to_double(light.intensity));
     if (!(intensity > 0)) continue;
     LightSurvey::Punctual& kind = survey->punctual[static_cast<int>(light.kind)];
@@ -132,11 +167,13 @@ void survey_punctual(const Scene& scene, LightSurvey* survey) {
     double irradiance = intensity;
     if (light.kind != LightKind::directional) {
       looked_at += survey->triangles;
+      const bool afford = looked_at <= kMostDistances;
       const Vec3d point = scene.normalisation.to_normalised(light.position);
-      const double distance = looked_at > kMostDistances
-                                  ? 0
-                                  : nearest_surface(scene, point) / scene.normalisation.scale();
+      const double nearest = afford ? nearest_surface(scene, point) : 0;
+      const double distance = nearest / scene.normalisation.scale();
       irradiance = intensity / (distance * distance);
+      survey->patches[i] = afford ? patch_area(scene, light, point, nearest) / survey->area : 0;
+      kind.least_patch = std::min(kind.least_patch, survey->patches[i]);
     }
     kind.max_irradiance_over_pi += irradiance / kPi;
   }
@@ -175,6 +212,7 @@ LightSurvey survey_light(const Scene& scene, const Environment* environment) {
     if (mesh.triangles.empty()) continue;
     if (material.unlit) survey.unlit_area += one.area;
     if (one.emits()) survey.emissive_area += one.area;
+    survey.emissive_power += one.area * luminance(one.mean_emission);
     if (material.metallic > 0 && !material.unlit) survey.metallic_area += one.area;
     if (material.alpha_mode == AlphaMode::blend) survey.blend_area += one.area;
     survey.max_albedo = std::max(survey.max_albedo, max_channel(one.max_albedo));

@@ -3,6 +3,7 @@
 // What light a scene and its environment hold, in figures: areas, albedos and upper bounds. The
 // effects decide by them; nothing is traced.
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -27,6 +28,7 @@ struct MeshSurvey {
   Vec3d mean_albedo;            // factor times the means of texture and vertex colours
   Vec3d mean_emission;          // factor times the mean of the texture; 0 when it emits nothing
   Vec3d max_emission;           // the most that any texel emits
+  Vec3d mean_shown;             // of an unlit mesh: what it shows, as mean_albedo; 0 otherwise
   bool textured = false;        // a base-colour texture that is not white, or a textured emission
   bool vertex_colored = false;  // a vertex colour that is not white
   bool alpha_tested = false;    // MASK with some texel, vertex or factor under the cutoff
@@ -38,8 +40,9 @@ struct LightSurvey {
   double area = 0;                 // of all meshes
   double unlit_area = 0;
   double emissive_area = 0;
-  double metallic_area = 0;  // metallic factor above 0
-  double blend_area = 0;     // alpha mode BLEND
+  double emissive_power = 0;  // area times luminance of emission, one side
+  double metallic_area = 0;   // metallic factor above 0
+  double blend_area = 0;      // alpha mode BLEND
   uint64_t triangles = 0;
   double max_albedo = 0;    // largest channel of any lit surface
   double mean_albedo = 0;   // luminance, weighted by area
@@ -58,8 +61,12 @@ struct LightSurvey {
   struct Punctual {
     uint64_t count = 0;
     double max_irradiance_over_pi = 0;
+    double least_patch = INFINITY;  // least of `patches` of those lights
   };
   Punctual punctual[3];
+  // As Scene::lights: about which share of all area a light shines on, by the solid angle of its
+  // cone at the nearest surface (spots: along their axis). INFINITY for directional ones.
+  std::vector<double> patches;
 };
 
 // Pure. `environment` may be null (black).

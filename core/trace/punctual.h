@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "core/base/random.h"
 #include "core/scene/scene.h"
 #include "core/trace/effects.h"
 
@@ -17,6 +18,13 @@ struct PunctualSample {
   bool distant = false;
 };
 
+// A ray of light that leaves a light.
+struct LightBeam {
+  size_t light = 0;
+  Vec3 origin;  // normalised space
+  Vec3 direction;
+};
+
 class PunctualLights {
  public:
   // Up to this many lights each get a shadow ray; of more, one is drawn by its share of intensity.
@@ -24,7 +32,7 @@ class PunctualLights {
 
   PunctualLights() = default;
   // The lights of `scene` whose kind is selected and that shine.
-  PunctualLights(const Scene& scene, const EffectSelection& selection);
+  PunctualLights(const Scene& scene, const LightSurvey& survey, const EffectSelection& selection);
 
   size_t size() const { return lights_.size(); }
 
@@ -35,6 +43,15 @@ class PunctualLights {
 
   // A light drawn by intensity, and its probability. choice in [0, 1).
   size_t choose(float choice, float* probability) const;
+  // The probability that the path tracer looks at a light from any one point.
+  float chance(size_t light) const;
+
+  // Lights that shine on small patches (EffectSelection::punctual_patches) send beams, uniform over
+  // sphere or cone.
+  bool has_beams() const { return !beams_.empty(); }
+  LightBeam beam(const Point4& u) const;
+  // Density of beam() per steradian around a light, within its cone; 0 for one that sends none.
+  float beam_density(size_t light) const { return lights_[light].beam_density; }
 
  private:
   struct Light {
@@ -44,9 +61,15 @@ class PunctualLights {
     Vec3d intensity;
     double range = 0;  // metres; 0 = unlimited
     double cone_scale = 0, cone_offset = 0;
+    double cone_height = 2;  // 1 - cosine of its cone's half angle
+    float beam_density = 0;
   };
+  void prepare_beams(const std::vector<double>& weights);
+
   std::vector<Light> lights_;
   std::vector<double> cdf_;
+  std::vector<size_t> beams_;  // lights that send some
+  std::vector<double> beam_cdf_;
   double metres_per_unit_ = 1;
 };
 

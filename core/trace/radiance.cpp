@@ -14,10 +14,6 @@ namespace {
 
 constexpr float kInversePi = static_cast<float>(1 / kPi);
 
-// A shadow ray ends this share of its length before the emitter, more than the rounding of its
-// parameter at any angle that carries light; scale-free.
-constexpr float kSegment = 1 - 0x1p-13f;
-
 enum class PathDimension : uint64_t { scatter = 0, environment = 1, emissive = 2, punctual = 3 };
 
 uint64_t path_key(uint64_t key, int vertex, PathDimension dimension) {
@@ -42,15 +38,11 @@ Vec3 cosine_hemisphere(float u, float v) {
   return {r * static_cast<float>(around.cos), r * static_cast<float>(around.sin), std::sqrt(1 - u)};
 }
 
-// The power heuristic's weight p^2 / (p^2 + q^2) of light found with density p, times q / p, so
-// that it counts like a ray of density q; p may be infinite.
-float weight_of_found(float q, float p) {
-  return 1 / (q / p + p / q);
-}
-
 struct Vertex {
   SurfacePoint point;
   Vec3 normal;  // geometric, towards where the path came from
+  // Per normalised area, of arriving here rather than being connected to; 0 where nothing connects.
+  float arrival_density = 0;
 };
 
 }  // namespace
@@ -119,9 +111,11 @@ struct PathKernel {
       here.point = surface_point(scene.tracer_->scene(), hit);
       const bool front = dot(here.point.normal, ray.direction) < 0;
       here.normal = front ? here.point.normal : -here.point.normal;
+      here.arrival_density = (first ? first_density : scatter_pdf) *
+                             -dot(here.normal, ray.direction) / (hit.t * hit.t);
       const SurfaceRecord& record = scene.colors_.record(hit.mesh);
       if (record.unlit) {
-        if (first) radiance += scene.colors_.base_color<kDetail>(hit, counters);
+        if (first) show_unlit(hit, -dot(here.normal, ray.direction));
         return;
       }
       if constexpr ((kMask & kEmissionBit) != 0) {
@@ -181,16 +175,22 @@ struct PathKernel {
     }
   }
 
+  void show_unlit(const Hit& hit, float cosine) {
+    float weight = 1;
+    if (first_density > 0 && !scene.unlit_.empty()) {
+      weight =
+          power_heuristic(first_density * cosine, scene.unlit_.area_density(hit) * hit.t * hit.t);
+    }
+    radiance += scene.colors_.base_color<kDetail>(hit, counters) * weight;
+  }
+
   // Density per solid angle of the emitters' sampler: density per area times d^2 / cos.
   void add_emission(const Hit& hit, float cosine) {
     float weight = 1;
-    if (!scene.emitters_.empty()) {
-      const float looked_for = scene.emitters_.area_density(hit.mesh) * hit.t * hit.t;
-      if (!first) {
-        weight = power_heuristic(scatter_pdf * cosine, looked_for);
-      } else if (first_density > 0) {
-        weight = power_heuristic(first_density * cosine, looked_for);
-      }
+    const EmissiveSampler& looking = first ? scene.lamps_ : scene.emitters_;
+    const float met = first ? first_density : scatter_pdf;
+    if (!looking.empty() && met > 0) {
+      weight = power_heuristic(met * cosine, looking.area_density(hit) * hit.t * hit.t);
     }
     radiance += throughput * scene.colors_.emission<kDetail>(hit, counters) * weight;
   }
@@ -202,7 +202,12 @@ struct PathKernel {
     if constexpr ((kMask & kEmissionBit) != 0) {
       if (!scene.emitters_.empty()) light_from_emitters(here, vertex);
     }
-    if constexpr ((kMask & kPunctualBit) != 0) light_from_punctual(here, vertex);
+    if constexpr ((kMask & kPunctualBit) != 0) {
+      light_from_punctual(here, vertex);
+      if (scene.punctual_.has_beams() && vertex + 1 < scene.selection_.max_bounces) {
+        light_from_patches(here, vertex);
+      }
+    }
   }
 
   bool shadowed(const Vec3& origin, const Vec3& direction, float end) {
@@ -226,7 +231,8 @@ struct PathKernel {
   // rho / pi L cos cos' / (d^2 p_area).
   void light_from_emitters(const Vertex& here, int vertex) {
     const Point4 u = sobol4(path_key(key, vertex, PathDimension::emissive), index);
-    const Hit light = scene.emitters_.sample(u.x, u.y, u.z);
+    const EmissiveSampler::Draw drawn = scene.emitters_.sample(u);
+    const Hit& light = drawn.point;
     const SurfacePoint there = surface_point(scene.tracer_->scene(), light);
     const Vec3 between = there.position - here.point.position;
     const float distance2 = dot(between, between);
@@ -238,7 +244,7 @@ struct PathKernel {
     if (!(cosine > 0) || !lit || !scene.colors_.present(light, counters)) return;
     const Vec3 origin = offset_origin(here.point, direction);
     if (shadowed(origin, offset_origin(there, -direction) - origin, kSegment)) return;
-    const float light_pdf = scene.emitters_.area_density(light.mesh) * distance2 / std::abs(facing);
+    const float light_pdf = drawn.area_density * distance2 / std::abs(facing);
     const float scattered = cosine * kInversePi;
     radiance += throughput * scene.colors_.emission<kDetail>(light, counters) *
                 (scattered / light_pdf * power_heuristic(light_pdf, scattered));
@@ -247,26 +253,53 @@ struct PathKernel {
   void light_from_punctual(const Vertex& here, int vertex) {
     const size_t count = scene.punctual_.size();
     if (count <= PunctualLights::kEveryLight) {
-      for (size_t i = 0; i < count; ++i) light_from_point(here, i, 1);
+      for (size_t i = 0; i < count; ++i) light_from_point(here, i, 1.0f);
       return;
     }
     const Point2 u = sobol2(path_key(key, vertex, PathDimension::punctual), index);
     float probability = 1;
     const size_t chosen = scene.punctual_.choose(u.x, &probability);
-    if (probability > 0) light_from_point(here, chosen, 1 / probability);
+    if (probability > 0) light_from_point(here, chosen, probability);
   }
 
-  // rho / pi E cos.
-  void light_from_point(const Vertex& here, size_t index_of_light, float weight) {
+  // rho / pi E cos, looked at with some probability; weighted against connections to the light's
+  // patch.
+  void light_from_point(const Vertex& here, size_t index_of_light, float probability) {
     PunctualSample light;
     if (!scene.punctual_.light_at(index_of_light, here.point.position, &light)) return;
     const float cosine = dot(here.normal, light.to_light) / length(light.to_light);
     if (!(cosine > 0)) return;
+    float weight = 1 / probability;
+    const float beam = scene.punctual_.beam_density(index_of_light);
+    if (beam > 0 && here.arrival_density > 0) {
+      const float connected = beam * cosine / dot(light.to_light, light.to_light);
+      weight *= power_heuristic(here.arrival_density * probability, connected);
+    }
     const Vec3 origin = offset_origin(here.point, light.to_light);
     const Vec3 along =
         light.distant ? light.to_light : here.point.position + light.to_light - origin;
     if (shadowed(origin, along, light.distant ? INFINITY : 1.0f)) return;
     radiance += throughput * light.irradiance * (cosine * kInversePi * weight);
+  }
+
+  // rho / pi L cos cos' / (d^2 p_area), L being what the patch reflects of the light that lit it.
+  void light_from_patches(const Vertex& here, int vertex) {
+    const uint64_t dimension =
+        static_cast<uint64_t>(DimensionSet::path_patch) + static_cast<uint64_t>(vertex);
+    RadianceScene::Patch patch;
+    if (!scene.patch(sobol4(hash_combine(key, dimension), index), counters, &patch)) return;
+    const Vec3 between = patch.point.position - here.point.position;
+    const float distance2 = dot(between, between);
+    if (!(distance2 > 0)) return;
+    const Vec3 direction = between / std::sqrt(distance2);
+    const float cosine = dot(here.normal, direction), facing = -dot(patch.normal, direction);
+    if (!(cosine > 0) || !(facing > 0)) return;
+    const Vec3 origin = offset_origin(here.point, direction);
+    if (shadowed(origin, offset_origin(patch.point, -direction) - origin, kSegment)) return;
+    const float patch_pdf = patch.area_density * distance2 / facing;
+    const float scattered = cosine * kInversePi;
+    radiance += throughput * patch.radiance *
+                (scattered / patch_pdf * power_heuristic(patch_pdf, scattered * patch.chance));
   }
 };
 
@@ -296,39 +329,19 @@ RadianceScene::RadianceScene(const Tracer& tracer, const Environment* environmen
     if (glare_->black()) glare_.reset();
   }
   if (selection.emissive && selection.emissive_sampling) {
-    emitters_ = EmissiveSampler(tracer.scene(), survey);
+    const auto sampler = [&](EmissiveSampler::Purpose purpose) {
+      return EmissiveSampler(tracer.scene(), survey, EmissiveSampler::Shining::emissive, purpose,
+                             selection.textures);
+    };
+    emitters_ = sampler(EmissiveSampler::Purpose::lighting);
+    lamps_ = sampler(EmissiveSampler::Purpose::seeing);
   }
-  punctual_ = PunctualLights(tracer.scene(), selection);
+  if (selection.unlit) {
+    unlit_ = EmissiveSampler(tracer.scene(), survey, EmissiveSampler::Shining::unlit,
+                             EmissiveSampler::Purpose::seeing, selection.textures);
+  }
+  punctual_ = PunctualLights(tracer.scene(), survey, selection);
   kernel_ = kKernels[mask != 0 ? mask : radiance_mask(selection)];
-}
-
-DirectLight RadianceScene::glare(const Vec3& origin, const Point2& u, const FirstDensity& density,
-                                 RayCounters& counters) const {
-  const EnvironmentSampler::Sample light = glare_->sample(u.x, u.y);
-  ++counters.environment_reads;
-  ++counters.shadow_rays;
-  if (tracer_->occluded({origin, light.direction, 0, INFINITY}, counters)) return {};
-  return {light.direction, light.radiance * weight_of_found(density(light.direction), light.pdf)};
-}
-
-DirectLight RadianceScene::lamp(const Vec3& origin, const Point4& u, const FirstDensity& density,
-                                RayCounters& counters) const {
-  const Hit light = emitters_.sample(u.x, u.y, u.z);
-  const SurfacePoint there = surface_point(tracer_->scene(), light);
-  const Vec3 between = there.position - origin;
-  const float distance2 = dot(between, between);
-  if (!(distance2 > 0)) return {};
-  const Vec3 direction = between / std::sqrt(distance2);
-  const float facing = -dot(there.normal, direction);
-  const bool lit = facing > 0 || (facing < 0 && colors_.record(light.mesh).double_sided);
-  if (!lit || !colors_.present(light, counters)) return {};
-  ++counters.shadow_rays;
-  const Vec3 along = offset_origin(there, -direction) - origin;
-  if (tracer_->occluded({origin, along, 0, kSegment}, counters)) return {};
-  const float cosine = std::abs(facing);
-  const float weight =
-      weight_of_found(density(direction) * cosine, emitters_.area_density(light.mesh) * distance2);
-  return {direction, colors_.emission<true>(light, counters) * weight};
 }
 
 }  // namespace lightkiln

@@ -10,9 +10,14 @@
 // by the power heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997,
 // section 9.2). Without sampling it simply counts fully, so that a furnace has no noise.
 //
-// What the first ray meets by itself may be smaller than the rays are apart, such as the sun or a
-// small lamp. Whoever fills a cube or a sphere therefore looks for it too (glare(), lamp()) and
-// tells sample() its own density, so that both are combined.
+// What the first ray meets by itself may be smaller than the rays are apart, such as the sun, a
+// small lamp or the patch that a spot light shines on. Whoever fills a cube or a sphere therefore
+// looks for it too (look()) and tells sample() its own density, so that both are combined.
+//
+// A patch that a punctual light shines on is small and bright too when scattered rays should meet
+// it: where the selection says so (punctual_patches), every vertex also connects to a point that a
+// ray from the light has met, combined with the scattered ray that meets it by itself (two-vertex
+// light paths of bidirectional path tracing, Veach, chapter 10).
 //
 // No roulette. Deep vertices are visited by fixed shares of the samples instead (see survives()):
 // the count is exact within every round, so a constant stays a constant.
@@ -51,9 +56,24 @@ inline constexpr uint32_t kFirstSamples = 4;
 int most_halvings(uint32_t index);
 bool survives(uint32_t index, int halvings);
 
+// A shadow ray ends this share of its length before what it looks for, more than the rounding of
+// its parameter at any angle that carries light; scale-free.
+inline constexpr float kSegment = 1 - 0x1p-13f;
+
 // The environment's luminance over this many times its mean is looked for directly; what is dimmer
 // is left to first rays, which are better at it.
 inline constexpr double kGlareFloor = 8;
+
+// What is looked for directly, because first rays may all miss it.
+enum class Sight {
+  glare,    // the brightest of the environment
+  lamps,    // emitters
+  unlit,    // surfaces that show their base colour
+  patches,  // what punctual lights shine on
+};
+inline constexpr Sight kSights[] = {Sight::glare, Sight::lamps, Sight::unlit, Sight::patches};
+// The dimensions of its points.
+DimensionSet dimensions_of(Sight sight);
 
 // Light seen directly, from where it was looked for.
 struct DirectLight {
@@ -72,23 +92,21 @@ class RadianceScene {
   // the randomisation (of seed, element, replicate), `index` the sample in it.
   //
   // `first_density` > 0 is the density per steradian of first rays in this direction for each call
-  // of glare() and of lamp(): light that these find as well counts q^2 / (q^2 + p^2), q this
-  // density and p theirs (the power heuristic, Veach, section 9.2, which leaves lights wider than a
-  // texel to the texel's own even samples). Each light that they return counts as the radiance of a
-  // first ray in that direction does: L / p * p^2 / (q^2 + p^2) = (L q p / (q^2 + p^2)) / q.
+  // of look() for each sight there is: light that these find as well counts q^2 / (q^2 + p^2), q
+  // this density and p theirs (the power heuristic, Veach, section 9.2, which leaves lights wider
+  // than a texel to the texel's own even samples). Each light that they return counts as the
+  // radiance of a first ray in that direction does: L / p * p^2 / (q^2 + p^2) = (L q p / (q^2 +
+  // p^2)) / q.
   Vec3 sample(const Ray& ray, uint64_t key, uint32_t index, RayCounters& counters,
               float first_density = 0) const {
     return kernel_(*this, ray, key, index, counters, first_density);
   }
-  // Whether there is anything to look for; if not, sample() ignores first_density.
-  bool has_glare() const { return glare_ != nullptr; }
-  bool has_lamps() const { return !emitters_.empty(); }
-  // The brightest of the environment and one point of the emitters, seen from `origin`.
-  // `density` gives first_density of a direction.
+  // Whether there is any of it to look for; where there is none at all, sample() ignores
+  // first_density.
+  bool has(Sight sight) const;
+  // One point of it, seen from `origin`. `density` gives first_density of a direction.
   using FirstDensity = std::function<float(const Vec3&)>;
-  DirectLight glare(const Vec3& origin, const Point2& u, const FirstDensity& density,
-                    RayCounters& counters) const;
-  DirectLight lamp(const Vec3& origin, const Point4& u, const FirstDensity& density,
+  DirectLight look(Sight sight, const Vec3& origin, const Point4& u, const FirstDensity& density,
                    RayCounters& counters) const;
 
   const EffectSelection& selection() const { return selection_; }
@@ -99,13 +117,31 @@ class RadianceScene {
   template <unsigned kMask>
   friend struct PathKernel;
 
+  // A point that a beam of light has met, and what it reflects of that light.
+  struct Patch {
+    SurfacePoint point;
+    Vec3 normal;  // towards the light
+    Vec3 radiance;
+    float area_density = 0;  // per normalised area
+    float chance = 1;        // that a path which meets the point looks at this light
+  };
+  bool patch(const Point4& u, RayCounters& counters, Patch* found) const;
+  DirectLight look_for_glare(const Vec3& origin, const Point4& u, const FirstDensity& density,
+                             RayCounters& counters) const;
+  DirectLight look_for_surface(const EmissiveSampler& shining, const Vec3& origin, const Point4& u,
+                               const FirstDensity& density, RayCounters& counters) const;
+  DirectLight look_for_patch(const Vec3& origin, const Point4& u, const FirstDensity& density,
+                             RayCounters& counters) const;
+
   const Tracer* tracer_;
   const Environment* environment_ = nullptr;
   std::unique_ptr<EnvironmentSampler> environment_sampler_;
   std::unique_ptr<EnvironmentSampler> glare_;
   EffectSelection selection_;
   SurfaceColors colors_;
-  EmissiveSampler emitters_;
+  EmissiveSampler emitters_;  // as surfaces look for them
+  EmissiveSampler lamps_;     // as whoever sees directly does
+  EmissiveSampler unlit_;
   PunctualLights punctual_;
   Kernel kernel_;
 };

@@ -9,9 +9,7 @@
 
 namespace lightkiln {
 
-namespace {
-
-// glTF's wrap modes on texel indices: any integer to [0, size).
+// glTF's wrap modes.
 int64_t wrap_index(int64_t index, int64_t size, WrapMode mode) {
   switch (mode) {
     case WrapMode::clamp:
@@ -25,6 +23,8 @@ int64_t wrap_index(int64_t index, int64_t size, WrapMode mode) {
   }
   return 0;
 }
+
+namespace {
 
 // Beyond 2^40 texels a float coordinate has no fraction left; the bound keeps the integer
 // conversion defined.

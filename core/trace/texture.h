@@ -2,6 +2,8 @@
 
 // Texture look-ups with wrapping and KHR_texture_transform.
 
+#include <cstdint>
+
 #include "core/scene/scene.h"
 
 namespace lightkiln {
@@ -14,6 +16,9 @@ struct Vec4 {
 // counter-clockwise as seen with v pointing down, so that
 //   u' =  cos(r) u + sin(r) v,   v' = -sin(r) u + cos(r) v.
 Vec2 transform_texcoord(const TextureSlot& slot, const Vec2& uv);
+
+// Which of `size` texels in a row or column any index reads.
+int64_t wrap_index(int64_t index, int64_t size, WrapMode mode);
 
 // (r, g, b, a) at texture coordinate uv: colour decoded from sRGB to linear before filtering, alpha
 // linear in [0, 1]. Nearest or bilinear as the texture says; (0, 0) is the upper left corner of

@@ -230,6 +230,7 @@ TEST(Effects, EveryEffectIsListedWithReasonAndBound) {
                                              "punctual_directional",
                                              "punctual_point",
                                              "punctual_spot",
+                                             "punctual_patches",
                                              "textures",
                                              "vertex_colors",
                                              "alpha_test",
