@@ -33,6 +33,11 @@ struct ElementRange {
 struct Plan {
   Kind kind = Kind::ambient_occlusion;
   std::string engine_version = kEngineVersion;
+  // The instruction set that rays are traced with. Equal plans give equal bytes where it is equal,
+  // on C libraries that compute equal powers, exponentials and logarithms: of probes the table that
+  // decodes sRGB textures rests on powers, the error and with it the number of doublings on the
+  // quantile of F, and the number of bounces on a power of the largest albedo. Sines, cosines and
+  // arc tangents are our own and the same everywhere.
   std::string isa;
   std::vector<Effect> effects;
   std::vector<std::string> warnings;

@@ -1,6 +1,7 @@
 #include "core/bake/probe_cube.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <span>
 
@@ -24,6 +25,12 @@ double half_width_factor() {
 }
 
 }  // namespace
+
+uint32_t looks_for_one(int size) {
+  constexpr uint32_t kPathsPerLook = 16, kMost = 32;
+  const auto texels = static_cast<uint32_t>(6 * size * size);
+  return std::clamp(std::bit_floor(texels / (kPathsPerLook * kDirectPerSample)), 1u, kMost);
+}
 
 CubeTexels all_texels(int size) {
   CubeTexels all;
@@ -86,13 +93,15 @@ CubeSampling::Sighting CubeSampling::look(Sight sight, uint64_t replicate, uint3
   return {slot_of(to_double(light.direction)), light};
 }
 
-// Searches in parallel, adds in order. A light of weight w found within a texel counts like one of
-// its n points: L w to its sum, and L w A J y / n to the harmonics, its share of the integral.
+// Searches in parallel, adds in order. A light of weight w found within a texel by one of m looks
+// that stand for one counts like one of its n points, over m: L w / m to its sum, and
+// L w / m A J y / n to the harmonics, its share of the integral.
 void CubeSampling::look_directly(Sight sight, uint32_t from, uint32_t to, Progress& progress,
                                  double done, RayCounters* counters,
                                  std::vector<Vec3d>* harmonics) {
   constexpr size_t kWave = 1 << 16, kBlock = 1 << 12;
-  const size_t each = size_t{kDirectPerSample} * (to - from), all = replicates_ * each;
+  const uint32_t looks = looks_for_one(order_.size), per_sample = kDirectPerSample * looks;
+  const size_t each = size_t{per_sample} * (to - from), all = replicates_ * each;
   const double area = 4.0 / (order_.size * order_.size);
   const size_t coefficients = sh_coefficient_count(bands_);
   std::vector<double> basis(coefficients);
@@ -105,7 +114,7 @@ void CubeSampling::look_directly(Sight sight, uint32_t from, uint32_t to, Progre
         [&](size_t begin, size_t end) {
           for (size_t i = begin; i < end; ++i) {
             const size_t number = first + i;
-            const auto index = static_cast<uint32_t>(kDirectPerSample * from + number % each);
+            const auto index = static_cast<uint32_t>(per_sample * from + number % each);
             found[i] = look(sight, number / each, index, counted[begin / kBlock]);
           }
         },
@@ -114,7 +123,7 @@ void CubeSampling::look_directly(Sight sight, uint32_t from, uint32_t to, Progre
     for (size_t i = 0; i < count; ++i) {
       if (found[i].slot == kNowhere) continue;
       const size_t replicate = (first + i) / each;
-      const Vec3d radiance = to_double(found[i].light.radiance);
+      const Vec3d radiance = to_double(found[i].light.radiance) / static_cast<double>(looks);
       Texel& slot = slots_[found[i].slot];
       slot.sum += radiance;
       slot.luminance[replicate] += luminance(radiance);

@@ -9,9 +9,11 @@
 //
 // Points in texels may all miss a sun, a small lamp, a small unlit object or a small patch of light
 // that the probe sees itself, and then show no variance either. So these are looked for as well
-// (RadianceScene::look), each kind kDirectPerSample times for each sample of a texel, and both ways
-// are combined by their densities. The number is small, so that light which spans many texels is
-// left to the points in texels, which are even.
+// (RadianceScene::look), each kind as if kDirectPerSample times for each sample of a texel, and
+// both ways are combined by these densities. The number is small, so that light which spans many
+// texels is left to the points in texels, which are even. Of large cubes each such look is a mean
+// of several: a sun that falls on few texels is most of their error, and looks cost little beside
+// thousands of texels' paths.
 
 #include <cstdint>
 #include <vector>
@@ -34,6 +36,8 @@ struct CubeTexels {
 CubeTexels all_texels(int size);
 
 inline constexpr uint32_t kDirectPerSample = 16;
+// How many looks stand for one, a power of two: together about a sixteenth of the texels' paths.
+uint32_t looks_for_one(int size);
 
 class CubeSampling {
  public:

@@ -89,7 +89,8 @@ struct Survey {
   CubeTexels cells;
   std::vector<double> variances;  // of means over kFirstSamples
   double variance = 0;            // mean over the sphere
-  double seconds_per_path = 0;
+  double rays_per_path = 0;
+  double seconds_per_ray = 0;
 };
 
 Survey survey_cube(const RadianceScene& scene, const ProbesState& state, uint64_t probe, int cells,
@@ -102,7 +103,9 @@ Survey survey_cube(const RadianceScene& scene, const ProbesState& state, uint64_
   const Round round = sampling.advance(progress, begin, end);
   const double paths =
       static_cast<double>(survey.cells.texels.size()) * static_cast<double>(kSurveyPaths);
-  survey.seconds_per_path = round.wall_s / paths;
+  const auto rays = static_cast<double>(round.rays);
+  survey.rays_per_path = rays / paths;
+  survey.seconds_per_ray = round.wall_s / std::max(rays, 1.0);
   for (size_t i = 0; i < survey.cells.texels.size(); ++i) {
     survey.variances.push_back(sampling.variance(i));
     survey.variance += survey.cells.shares[i] * survey.variances.back();
@@ -154,23 +157,23 @@ ProbePilot pilot_probe(const RadianceScene& scene, const ProbesState& state, con
     const auto fresh = static_cast<double>(round.samples - before);
     const double rays = static_cast<double>(round.rays) / fresh;
     if (k == 0) first_rays = rays;
-    pilot.seconds.push_back(survey.seconds_per_path * rays / std::max(first_rays, 1.0) * fresh *
-                            texels);
+    pilot.rays.push_back(survey.rays_per_path * rays / std::max(first_rays, 1.0) * fresh * texels);
     if (!(seen.variance > 0)) continue;
     pilot.effective_texels = std::max(1.0, seen.variance * seen.variance / seen.squares);
     pilot.doubt = 0.5 * std::sqrt(seen.noise) / seen.variance;
   }
   pilot.curve.slope = fitted_slope(pilot.curve.errors);
+  pilot.seconds_per_ray = survey.seconds_per_ray;
   return pilot;
 }
 
 }  // namespace
 
-double ProbePilot::seconds_to(int doublings) const {
+double ProbePilot::rays_to(int doublings) const {
   double sum = 0, round = 0;
   for (int k = 0; k <= doublings; ++k) {
     const auto index = static_cast<size_t>(k);
-    round = index < seconds.size() ? seconds[index] : 2 * round;
+    round = index < rays.size() ? rays[index] : 2 * round;
     sum += round;
   }
   return sum;
@@ -203,9 +206,11 @@ namespace {
 // A curve's height is known to within its doubt, and each doubling past its end adds to that.
 constexpr double kLeastDoubt = 0.04;
 constexpr double kDoubtPerDoubling = 0.05;
+// The normal law's quantile of a 90 % interval.
+constexpr double kNinety = 1.6449;
 
 struct Outcome {
-  double seconds = 0, samples = 0;
+  double rays = 0, samples = 0;
   bool extrapolated = false;
 };
 Outcome outcome_of(const ProbePilot& pilot, double shift, double target, uint64_t fewest,
@@ -220,40 +225,59 @@ Outcome outcome_of(const ProbePilot& pilot, double shift, double target, uint64_
     const double doubt = std::hypot(std::max(pilot.doubt, kLeastDoubt), kDoubtPerDoubling * beyond);
     stop = stop_of(pilot.curve, widening, target * std::exp(-shift * doubt), fewest, most);
   }
-  return {pilot.seconds_to(stop.doublings), static_cast<double>(stop.samples), stop.extrapolated};
+  return {pilot.rays_to(stop.doublings), static_cast<double>(stop.samples), stop.extrapolated};
+}
+
+// What one probe takes, with the squares of what its curve leaves open below and above.
+struct Leeway {
+  double rays = 0, below = 0, above = 0;
+};
+
+// Low and high add, in squares, what the curves leave open for each probe and what the choice of
+// pilot probes leaves open for the others.
+Expected of_all(const std::vector<Leeway>& pilots, double elements) {
+  RunningMoments moments;
+  double below = 0, above = 0;
+  for (const Leeway& pilot : pilots) {
+    moments.add(pilot.rays);
+    below += pilot.below;
+    above += pilot.above;
+  }
+  const double n = static_cast<double>(pilots.size());
+  const double choice = n < elements && n > 1 ? kNinety * std::sqrt(moments.variance() / n) : 0;
+  return {elements * moments.mean,
+          elements * std::max(0.0, moments.mean - std::hypot(std::sqrt(below) / n, choice)),
+          elements * (moments.mean + std::hypot(std::sqrt(above) / n, choice))};
 }
 
 }  // namespace
 
 // Stopping rounds samples up to a doubling, so near a doubling's edge a doubtful curve leaves two
 // costs possible: the expectation over a normal law of its logarithm, by its quintiles' middles,
-// lies between them. Low and high add, in squares, what the curves leave open for each probe and
-// what the choice of pilot probes leaves open for the others.
+// lies between them.
 Forecast forecast(const std::vector<ProbePilot>& pilots, uint64_t elements, double target,
                   uint64_t fewest, uint64_t most) {
   static constexpr double kMiddles[] = {-1.2816, -0.5244, 0, 0.5244, 1.2816};
-  static constexpr double kNinety = 1.6449;
   Forecast result;
-  RunningMoments seconds;
-  double low = 0, high = 0;
+  std::vector<Leeway> rays, seconds;
   for (const ProbePilot& pilot : pilots) {
-    double expected = 0;
+    Leeway leeway;
     for (const double shift : kMiddles) {
       const Outcome outcome = outcome_of(pilot, shift, target, fewest, most);
-      expected += outcome.seconds / 5;
-      result.samples += outcome.samples / 5;
+      leeway.rays += outcome.rays / 5;
+      result.samples += outcome.samples / 5 / static_cast<double>(pilots.size());
       if (shift == 0) result.extrapolated |= outcome.extrapolated;
     }
-    seconds.add(expected);
-    low += std::pow(expected - outcome_of(pilot, -kNinety, target, fewest, most).seconds, 2);
-    high += std::pow(outcome_of(pilot, kNinety, target, fewest, most).seconds - expected, 2);
+    const double low = outcome_of(pilot, -kNinety, target, fewest, most).rays;
+    const double high = outcome_of(pilot, kNinety, target, fewest, most).rays;
+    leeway.below = (leeway.rays - low) * (leeway.rays - low);
+    leeway.above = (high - leeway.rays) * (high - leeway.rays);
+    rays.push_back(leeway);
+    const double pace = pilot.seconds_per_ray;
+    seconds.push_back({leeway.rays * pace, leeway.below * pace * pace, leeway.above * pace * pace});
   }
-  const double n = static_cast<double>(pilots.size()), all = static_cast<double>(elements);
-  const double choice = n < all && n > 1 ? kNinety * std::sqrt(seconds.variance() / n) : 0;
-  result.samples /= n;
-  result.seconds = seconds.mean * all;
-  result.low_s = std::max(0.0, all * (seconds.mean - std::hypot(std::sqrt(low) / n, choice)));
-  result.high_s = all * (seconds.mean + std::hypot(std::sqrt(high) / n, choice));
+  result.rays = of_all(rays, static_cast<double>(elements));
+  result.seconds = of_all(seconds, static_cast<double>(elements));
   return result;
 }
 

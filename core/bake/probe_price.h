@@ -20,21 +20,25 @@ struct ProbePilot {
   ErrorCurve curve;
   double effective_texels = 1;  // as CubeError has it
   double doubt = 0;             // relative standard error of the curve's height
-  std::vector<double>
-      seconds;  // wall, of each round of the cube; the last one's doubles from there
+  std::vector<double> rays;     // of each round of the cube; the last one's double from there
+  double seconds_per_ray = 0;   // wall
 
-  double seconds_to(int doublings) const;  // of all rounds up to there
+  double rays_to(int doublings) const;  // of all rounds up to there
 };
 
 // One for each of `probes`, sampled as `plan` orders.
 std::vector<ProbePilot> pilot_rounds(ProbesState& state, const Plan& plan,
                                      const std::vector<uint64_t>& probes, Progress& progress);
 
+// An expectation, given the pilot's doubt, and a 90 % interval.
+struct Expected {
+  double value = 0, low = 0, high = 0;
+};
+
 // What all `elements` take when each stops by the rule, `target` left for noise.
 struct Forecast {
-  double seconds = 0;  // the expectation, given the pilot's doubt
-  double low_s = 0;    // a 90 % interval
-  double high_s = 0;
+  Expected rays;              // work: the same on every machine
+  Expected seconds;           // the same at the pace of the pilot
   double samples = 0;         // a texel, their mean over probes
   bool extrapolated = false;  // some probe needs more rounds than the pilot ran
 };

@@ -43,7 +43,7 @@ uint64_t samples_within(const std::vector<ProbePilot>& pilots, double seconds, c
   uint64_t samples = plan.max_samples;
   const double target = 0;  // no rule ends it earlier
   while (samples > kFewestSamples &&
-         forecast(pilots, plan.elements, target, samples, samples).seconds > seconds) {
+         forecast(pilots, plan.elements, target, samples, samples).seconds.value > seconds) {
     samples /= 2;
   }
   return samples;
@@ -54,7 +54,7 @@ void price(const ProbesState& state, const std::vector<ProbePilot>& pilots, Plan
     plan->max_samples = samples_within(pilots, *limit, *plan);
     plan->min_samples = std::min(plan->min_samples, plan->max_samples);
     const uint64_t least = plan->min_samples;
-    if (forecast(pilots, plan->elements, 0, least, least).seconds > *limit) {
+    if (forecast(pilots, plan->elements, 0, least, least).seconds.value > *limit) {
       plan->warnings.push_back("Even " + std::to_string(least) +
                                " samples a texel, the fewest, may take longer than max_seconds "
                                "allows.");
@@ -62,15 +62,15 @@ void price(const ProbesState& state, const std::vector<ProbePilot>& pilots, Plan
   }
   const Forecast order = forecast(pilots, plan->elements, noise_target(state, *plan),
                                   plan->min_samples, plan->max_samples);
-  plan->predicted_s = order.seconds;
-  plan->predicted_low_s = order.low_s;
-  plan->predicted_high_s = order.high_s;
+  plan->predicted_s = order.seconds.value;
+  plan->predicted_low_s = order.seconds.low;
+  plan->predicted_high_s = order.seconds.high;
   for (const double error : kQuotedErrors) {
     // No limit of samples: a price says what the error needs.
     const Forecast quoted =
         forecast(pilots, plan->elements, error, plan->min_samples, uint64_t{1} << 40);
-    plan->prices.push_back({error, static_cast<uint64_t>(std::ceil(quoted.samples)), quoted.seconds,
-                            quoted.extrapolated});
+    plan->prices.push_back({error, static_cast<uint64_t>(std::ceil(quoted.samples)),
+                            quoted.seconds.value, quoted.extrapolated});
   }
 }
 

@@ -40,8 +40,8 @@ double bounded_half_width(std::span<const double> replicate_means, uint64_t tota
                           double confidence = 0.95);
 
 // Tells when a mean of non-negative values hangs on few of them, so that its variance estimate
-// cannot be trusted: one value holds more than a tenth of the sum, or the kurtosis exceeds 100.
-// Judges from 64 values on.
+// cannot be trusted: one value holds more than a tenth of the sum, or the kurtosis exceeds both 100
+// and a sixteenth of the count. Judges from 64 values on.
 struct TailGuard {
   uint64_t count = 0;
   double sum = 0, sum2 = 0, sum3 = 0, sum4 = 0;

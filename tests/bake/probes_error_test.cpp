@@ -78,7 +78,7 @@ TEST(Probes, StoppingKeepsTheErrorsCoverage) {
 // 95 % half-widths of texels against a truth of 64 times the samples.
 TEST(Probes, ErrorBarsCoverTheTruth) {
   const LitScene lit(colored_room(), {}, bounces(3));
-  const CubeTexels texels = all_texels(8);
+  const CubeTexels texels = all_texels(6);
   const Vec3 origin = to_float(lit.scene.normalisation.to_normalised({0.4, 0.1, 0.5}));
   Progress progress;
   CubeSampling truth(*lit.radiance, texels, origin, hash_combine(99, 0), 0, 2);

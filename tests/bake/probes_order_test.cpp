@@ -46,6 +46,7 @@ TEST(Probes, BytesDoNotDependOnThreadsOrChunks) {
   ProbesOrder order;
   order.positions = {{0, 0, 0}, {0.5, 0.2, 0.5}, {0.3, -0.5, 0.6}};
   order.size = 5;
+  order.max_bounces = 3;
   order.max_samples = 128;
   std::vector<std::byte> expected;
   Plan plan;
@@ -100,7 +101,7 @@ TEST(Probes, SecondsPinTheSamples) {
 
 TEST(Probes, CancelEndsABakeUnderWay) {
   ProbesOrder order;
-  order.size = 64;
+  order.size = 16;
   order.target = 1e-4;
   ProbesHandle state = open_probes(colored_room(), gradient_sky(), order, 2);
   Progress quiet;
