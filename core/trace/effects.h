@@ -45,7 +45,7 @@ struct EffectSelection {
   bool environment_sampling = false;  // importance sampling; off for a constant environment
   bool emissive = false;
   bool emissive_sampling = false;  // off where emitters cover so much that paths meet them anyway
-  bool unlit = false;  // unlit surfaces are looked for, as the sun and lamps are
+  bool unlit = false;              // unlit surfaces are looked for, as the sun and lamps are
   bool punctual[3] = {false, false, false};  // by LightKind
   bool punctual_patches = false;  // paths also start at lights that shine on little (kSmallPatch)
   bool textures = false;

@@ -86,8 +86,7 @@ TexturedEmission::TexturedEmission(const SurfaceMesh& mesh, const TextureSlot& s
     Box box;
     for (const Triangle& triangle : triangles_) {
       if (!box_of(scaled(triangle), &box)) continue;
-      const auto most = static_cast<double>((box.x1 - box.x0) * (box.y1 - box.y0));
-      if (columns_.size > 1 || rows_.size > 1 || most <= kMostEntries) sum += most;
+      sum += static_cast<double>(box.x1 - box.x0) * static_cast<double>(box.y1 - box.y0);
     }
     return sum;
   };
@@ -115,8 +114,7 @@ bool TexturedEmission::box_of(const Triangle& t, Box* box) {
   box->y0 = static_cast<int64_t>(std::floor(std::min({t.a.y, t.b.y, t.c.y})));
   box->x1 = static_cast<int64_t>(std::floor(std::max({t.a.x, t.b.x, t.c.x}))) + 1;
   box->y1 = static_cast<int64_t>(std::floor(std::max({t.a.y, t.b.y, t.c.y}))) + 1;
-  return static_cast<double>(box->x1 - box->x0) * static_cast<double>(box->y1 - box->y0) <
-         kMostEntries;
+  return true;
 }
 
 // Bilinear look-ups in a texel's square read its neighbours too: their mean over it weighs texels
