@@ -85,10 +85,21 @@ DrawnTexels draw_texels(const CubeTexels& cells, const std::vector<double>& vari
   return result;
 }
 
+double pow2(double x) {
+  return x * x;
+}
+
+// A variance v of R replicates is estimated with variance 2 v^2 / (R - 1), where the estimate's
+// square has the mean v^2 (R + 1) / (R - 1): the one over the other.
+constexpr double doubt_of_replicates(int replicates) {
+  return 2.0 / (replicates + 1);
+}
+
 struct Survey {
   CubeTexels cells;
   std::vector<double> variances;  // of means over kFirstSamples
   double variance = 0;            // mean over the sphere
+  double doubt = 0;               // squared relative standard error of `variance`
   double rays_per_path = 0;
   double seconds_per_ray = 0;
 };
@@ -105,30 +116,45 @@ Survey survey_cube(const RadianceScene& scene, const ProbesState& state, uint64_
       static_cast<double>(survey.cells.texels.size()) * static_cast<double>(kSurveyPaths);
   const auto rays = static_cast<double>(round.rays);
   survey.rays_per_path = rays / paths;
+  double squares = 0;
   survey.seconds_per_ray = round.wall_s / std::max(rays, 1.0);
   for (size_t i = 0; i < survey.cells.texels.size(); ++i) {
     survey.variances.push_back(sampling.variance(i));
     survey.variance += survey.cells.shares[i] * survey.variances.back();
+    const double part = survey.cells.shares[i] * survey.variances.back();
+    squares += part * part;
+  }
+  if (survey.variance > 0) {
+    survey.doubt = doubt_of_replicates(kSurveyReplicates) * squares / pow2(survey.variance);
   }
   return survey;
 }
 
 // What the drawn texels tell of a whole cube after one round.
 struct Seen {
-  double variance = 0;  // mean over the sphere, of replicates' means
-  double squares = 0;   // sum over the cube of (share times variance)^2
-  double noise = 0;     // sum over what was drawn of (share times variance)^2
+  double variance = 0;         // mean over the sphere, of replicates' means
+  double squares = 0;          // sum over the cube of (share times variance)^2
+  double doubt = 0;            // squared relative standard error of `variance`
+  double replicate_doubt = 0;  // the part of it that replicates leave, drawing aside
 };
 Seen look_at(const CubeSampling& sampling, const DrawnTexels& drawn) {
   // The mean square of an estimate of variance from R replicates is (R + 1) / (R - 1) its square.
   constexpr double kUnbiased = (kReplicates - 1.0) / (kReplicates + 1.0);
   Seen seen;
+  double by_drawing = 0, by_replicates = 0;
   for (size_t i = 0; i < drawn.own_shares.size(); ++i) {
     const double variance = sampling.variance(i), share = drawn.texels.shares[i];
     seen.variance += share * variance;
     seen.squares += kUnbiased * share * drawn.own_shares[i] * variance * variance;
-    seen.noise += share * share * variance * variance;
+    // A texel drawn with probability p < 1 stands for 1 / p, at a variance of (1 - p) of its
+    // square.
+    const double part = pow2(share * variance);
+    by_drawing += std::max(0.0, 1 - drawn.own_shares[i] / share) * part;
+    by_replicates += doubt_of_replicates(kReplicates) * part;
   }
+  if (!(seen.variance > 0)) return seen;
+  seen.replicate_doubt = by_replicates / pow2(seen.variance);
+  seen.doubt = by_drawing / pow2(seen.variance) + seen.replicate_doubt;
   return seen;
 }
 
@@ -145,13 +171,17 @@ ProbePilot pilot_probe(const RadianceScene& scene, const ProbesState& state, con
   ProbePilot pilot;
   pilot.curve.first_samples = uint64_t{kReplicates} * kFirstSamples;
   const double texels = 6.0 * size * size;
-  // The survey saw every texel, so it sets the curve's height where its cells are texels.
-  double height = 1, first_rays = 0;
+  // Where its cells are texels, the survey knows the first error too: by all of them, but from few
+  // replicates. The curve's height is the geometric mean of both, by the inverse of their doubts.
+  double height = 1, share_of_survey = 0, first_rays = 0;
   for (int k = 0; k < kRounds; ++k) {
     const uint64_t before = sampling.samples();
     const Round round = sampling.advance(progress, middle, end);
     const Seen seen = look_at(sampling, drawn);
-    if (k == 0 && cells == size && seen.variance > 0) height = survey.variance / seen.variance;
+    if (k == 0 && cells == size && seen.variance > 0 && survey.variance > 0) {
+      share_of_survey = seen.doubt / (seen.doubt + survey.doubt);
+      height = std::pow(survey.variance / seen.variance, share_of_survey);
+    }
     pilot.curve.errors.push_back(std::sqrt(height * seen.variance / kReplicates) /
                                  plan.reference_luminance);
     const auto fresh = static_cast<double>(round.samples - before);
@@ -160,7 +190,8 @@ ProbePilot pilot_probe(const RadianceScene& scene, const ProbesState& state, con
     pilot.rays.push_back(survey.rays_per_path * rays / std::max(first_rays, 1.0) * fresh * texels);
     if (!(seen.variance > 0)) continue;
     pilot.effective_texels = std::max(1.0, seen.variance * seen.variance / seen.squares);
-    pilot.doubt = 0.5 * std::sqrt(seen.noise) / seen.variance;
+    // The first round's height leaves the survey's share of its doubt, this round its own.
+    pilot.doubt = 0.5 * std::sqrt((1 - share_of_survey) * seen.doubt + seen.replicate_doubt);
   }
   pilot.curve.slope = fitted_slope(pilot.curve.errors);
   pilot.seconds_per_ray = survey.seconds_per_ray;
@@ -222,7 +253,11 @@ Outcome outcome_of(const ProbePilot& pilot, double shift, double target, uint64_
   if (shift != 0) {
     const int beyond =
         std::max(0, stop.doublings + 1 - static_cast<int>(pilot.curve.errors.size()));
-    const double doubt = std::hypot(std::max(pilot.doubt, kLeastDoubt), kDoubtPerDoubling * beyond);
+    // The bake stops by its own estimate, which is as uncertain as sixteen replicates of so many
+    // texels are.
+    const double luck = 0.5 * std::sqrt(2 / ((kReplicates - 1) * pilot.effective_texels));
+    const double doubt =
+        std::hypot(std::max(pilot.doubt, kLeastDoubt), kDoubtPerDoubling * beyond, luck);
     stop = stop_of(pilot.curve, widening, target * std::exp(-shift * doubt), fewest, most);
   }
   return {pilot.rays_to(stop.doublings), static_cast<double>(stop.samples), stop.extrapolated};
