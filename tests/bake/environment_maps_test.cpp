@@ -9,20 +9,18 @@
 #include "core/image/radiance_hdr.h"
 #include "core/image/shrink.h"
 #include "core/sphere/direction_map.h"
+#include "tests/bake/maps_orders.h"
 #include "tests/reference/sphere_twins.h"
 #include "tests/support/data.h"
 
 namespace lightkiln {
 namespace {
 
-const std::string kDigest = "sha256:" + std::string(64, 'a');
-
-Spec order(const EnvironmentMapsParameters& parameters) {
-  Spec spec;
-  spec.environment = InputRef{kDigest, {}};
-  spec.parameters = parameters;
-  return spec;
-}
+using test::bake;
+using test::document_of;
+using test::exr_of;
+using test::kDigest;
+using test::order;
 
 EnvironmentMapsParameters everything() {
   EnvironmentMapsParameters parameters;
@@ -31,27 +29,6 @@ EnvironmentMapsParameters everything() {
   parameters.prefilter = PrefilterOutput{.size = 32, .levels = 4};
   parameters.dfg = DfgOutput{.size = 16};
   return parameters;
-}
-
-std::vector<std::byte> exr_of(const Image& image, EnvmapAttribute envmap = EnvmapAttribute::none) {
-  ExrWriteOptions options;
-  options.pixel_type = ExrPixelType::float32;
-  options.envmap = envmap;
-  return write_exr(image, options);
-}
-
-Assembly bake(const Spec& spec, const std::vector<std::byte>& file, int threads = 1,
-              Plan* plan = nullptr) {
-  Inputs inputs;
-  inputs.blobs[kDigest] = file;
-  Grants grants;
-  grants.threads = threads;
-  Progress progress;
-  return bake_all(spec, inputs, grants, progress, plan);
-}
-
-const EnvironmentDocument& document_of(const Assembly& assembly) {
-  return std::get<EnvironmentDocument>(assembly.document);
 }
 
 Image image_of(const Assembly& assembly, const std::string& name) {

@@ -7,12 +7,13 @@
 #include "core/image/exr.h"
 #include "core/sphere/harmonic_rotation.h"
 #include "core/sphere/map_layout.h"
+#include "tests/bake/maps_orders.h"
 #include "tests/reference/sphere_twins.h"
 
 namespace lightkiln {
 namespace {
 
-const std::string kDigest = "sha256:" + std::string(64, 'a');
+using test::exr_of;
 
 struct Baked {
   Assembly assembly;
@@ -36,23 +37,11 @@ struct Baked {
 };
 
 Baked bake(const EnvironmentMapsParameters& parameters, const std::vector<std::byte>& file) {
-  Spec spec;
-  spec.environment = InputRef{kDigest, {}};
-  spec.parameters = parameters;
+  const Spec spec = test::order(parameters);
   EXPECT_TRUE(validate(spec).empty());
-  Inputs inputs;
-  inputs.blobs[kDigest] = file;
-  Progress progress;
   Baked baked;
-  baked.assembly = bake_all(spec, inputs, Grants{}, progress, &baked.plan);
+  baked.assembly = test::bake(spec, file, 0, &baked.plan);
   return baked;
-}
-
-std::vector<std::byte> exr_of(const Image& image, EnvmapAttribute envmap = EnvmapAttribute::none) {
-  ExrWriteOptions options;
-  options.pixel_type = ExrPixelType::float32;
-  options.envmap = envmap;
-  return write_exr(image, options);
 }
 
 LayoutOutput sized(int size) {
@@ -200,7 +189,7 @@ TEST(Layouts, TurnsEveryOutputAlike) {
 
 TEST(Layouts, RefusesWhatDoesNotFitBeforeAnyFileIsOpened) {
   Spec spec;
-  spec.environment = InputRef{kDigest, {}};
+  spec.environment = InputRef{test::kDigest, {}};
   EnvironmentMapsParameters parameters;
   parameters.source.layout = LayoutKind::octahedral;
   parameters.source.distance = 3;

@@ -13,26 +13,17 @@
 #include "core/image/exr.h"
 #include "core/image/rgbd.h"
 #include "core/sphere/direction_map.h"
+#include "tests/bake/maps_orders.h"
 #include "tests/reference/sphere_twins.h"
 
 namespace lightkiln {
 namespace {
 
-const std::string kDigest = "sha256:" + std::string(64, 'a');
-
 Assembly bake(const Image& map, const EnvironmentMapsParameters& parameters, Plan* plan = nullptr,
               int threads = 1) {
-  ExrWriteOptions options;
-  options.pixel_type = ExrPixelType::float32;
-  const auto file = write_exr(map, options);
-  Spec spec;
-  spec.environment = InputRef{kDigest, {}};
-  spec.parameters = parameters;
+  Spec spec = test::order(parameters);
   spec.accuracy.check_texels = 2;
-  Inputs inputs;
-  inputs.blobs[kDigest] = file;
-  Progress progress;
-  return bake_all(spec, inputs, {threads, 0, 4}, progress, plan);
+  return test::bake(spec, test::exr_of(map), threads, plan);
 }
 
 const AssetDocument& document_of(const Assembly& assembly) {
@@ -206,7 +197,7 @@ TEST(MapsAsset, GivesTheSameBytesForAnyThreads) {
 TEST(MapsAsset, RefusesSizesThatDoNotHalveToSixteen) {
   for (const int size : {16, 48, 2048}) {
     Spec spec;
-    spec.environment = InputRef{kDigest, {}};
+    spec.environment = InputRef{test::kDigest, {}};
     EnvironmentMapsParameters parameters;
     parameters.asset = AssetOutput{size, AssetRoughness::linear};
     spec.parameters = parameters;

@@ -6,33 +6,18 @@
 
 #include "core/bake/bake.h"
 #include "core/image/exr.h"
+#include "tests/bake/maps_orders.h"
 #include "tests/reference/engine_sh.h"
 #include "tests/reference/sphere_twins.h"
 
 namespace lightkiln {
 namespace {
 
-const std::string kDigest = "sha256:" + std::string(64, 'a');
-
-std::vector<std::byte> exr_of(const Image& image) {
-  ExrWriteOptions options;
-  options.pixel_type = ExrPixelType::float32;
-  return write_exr(image, options);
-}
-
 EnvironmentDocument bake(const EnvironmentMapsParameters& parameters, const Image& map,
                          double target_error = 0.001, Plan* plan = nullptr) {
-  Spec spec;
-  spec.environment = InputRef{kDigest, {}};
-  spec.parameters = parameters;
+  Spec spec = test::order(parameters);
   spec.accuracy.target_error = target_error;
-  const std::vector<std::byte> file = exr_of(map);
-  Inputs inputs;
-  inputs.blobs[kDigest] = file;
-  Grants grants;
-  grants.threads = 1;
-  Progress progress;
-  return std::get<EnvironmentDocument>(bake_all(spec, inputs, grants, progress, plan).document);
+  return test::document_of(test::bake(spec, test::exr_of(map), 1, plan));
 }
 
 EnvironmentMapsParameters sh_order(const ShOutput& sh) {

@@ -8,39 +8,17 @@
 #include "core/image/decode.h"
 #include "core/image/exr.h"
 #include "core/scene/gltf.h"
+#include "tests/bake/maps_orders.h"
 #include "tests/reference/sphere_twins.h"
 #include "tests/support/data.h"
 
 namespace lightkiln {
 namespace {
 
-const std::string kDigest = "sha256:" + std::string(64, 'a');
-
-Spec order(const EnvironmentMapsParameters& parameters) {
-  Spec spec;
-  spec.environment = InputRef{kDigest, {}};
-  spec.parameters = parameters;
-  return spec;
-}
-
-std::vector<std::byte> exr_of(const Image& image) {
-  ExrWriteOptions options;
-  options.pixel_type = ExrPixelType::float32;
-  return write_exr(image, options);
-}
-
-Assembly bake(const Spec& spec, const std::vector<std::byte>& file, Plan* plan = nullptr) {
-  Inputs inputs;
-  inputs.blobs[kDigest] = file;
-  Grants grants;
-  grants.threads = 1;
-  Progress progress;
-  return bake_all(spec, inputs, grants, progress, plan);
-}
-
-const EnvironmentDocument& document_of(const Assembly& assembly) {
-  return std::get<EnvironmentDocument>(assembly.document);
-}
+using test::bake;
+using test::document_of;
+using test::exr_of;
+using test::order;
 
 const Artifact* artifact_of(const Assembly& assembly, const std::string& name) {
   for (const Artifact& artifact : assembly.artifacts) {
@@ -86,7 +64,7 @@ TEST(MapsSun, LeavesOthersTheMapWithoutIt) {
   EnvironmentMapsParameters with = maps();
   with.sun = SunOrder{};
   Plan plan;
-  const Assembly sunless = bake(order(with), exr_of(map), &plan);
+  const Assembly sunless = bake(order(with), exr_of(map), 1, &plan);
   const Assembly of_rest = bake(order(maps()), exr_of(rest.radiance));
   expect_equal_artifacts(of_rest, sunless);
   EXPECT_EQ(document_of(of_rest).sh->sh.coefficients, document_of(sunless).sh->sh.coefficients);
@@ -126,7 +104,7 @@ TEST(MapsSun, ChangesNothingOnAMapWithoutOne) {
   EnvironmentMapsParameters with = maps();
   with.sun = SunOrder{};
   Plan plan;
-  const Assembly a = bake(order(with), exr_of(map), &plan), b = bake(order(maps()), exr_of(map));
+  const Assembly a = bake(order(with), exr_of(map), 1, &plan), b = bake(order(maps()), exr_of(map));
   EXPECT_EQ(a.artifacts.size(), b.artifacts.size());
   expect_equal_artifacts(a, b);
   EXPECT_EQ(document_of(a).sh->sh.coefficients, document_of(b).sh->sh.coefficients);
@@ -182,7 +160,7 @@ TEST(MapsSun, LeavesAConstantMapInClosedForm) {
   EnvironmentMapsParameters with = maps();
   with.sun = SunOrder{.max_angular_radius_degrees = 5};
   Plan plan;
-  const Assembly result = bake(order(with), exr_of(map), &plan);
+  const Assembly result = bake(order(with), exr_of(map), 1, &plan);
   EXPECT_FALSE(effect_of(plan, "environment_variation").active);
   EXPECT_NEAR(document_of(result).sh->sh.coefficients[0].x, std::sqrt(kPi), 1e-12);
 }
