@@ -12,18 +12,18 @@ inline constexpr double kDirectPerOrder = 8e-10;
 inline constexpr double kLegendrePerTerm = 1.7e-10;  // and point in a row
 inline constexpr double kRingPerTerm = 7e-9;         // bands^3
 inline constexpr double kPerTexel = 4e-8;            // interpolation
-inline constexpr double kPerBrightPoint = 7e-9;
+inline constexpr double kPerBrightPoint = 3e-9;
 inline constexpr double kPerCorePoint = 4e-9;
 inline constexpr double kResamplePerCell = 1.3e-8;
 inline constexpr double kConvertPerTexel = 1.5e-6;  // of another layout
 inline constexpr double kLookUpPerTexel = 2.5e-7;   // of the source, for the round trip
-inline constexpr double kPerDfgPoint = 7e-9;
+inline constexpr double kPerDfgPoint = 3.1e-9;
 inline constexpr double kPerCharliePoint = 9e-9;
 inline constexpr double kRgbdPerTexel = 4e-7;  // packing and writing PNG
 inline constexpr double kSunPerTexel = 6e-9;
 inline constexpr double kLightSetPerTexel = 8e-9;  // into cells
 inline constexpr double kLightSetSeconds = 0.3;    // nine sets of 1 to 256 lights and their errors
-inline constexpr double kBrutePerTexel = 5e-9;     // of the map, each texel that is checked
+inline constexpr double kBrutePerTexel = 2e-9;     // of the map, each texel that is checked
 
 inline constexpr double kEnergyPerTexel = 2e-9;
 // Windows look for extremes on grids of 32 points a band squared; `minimal` does so about 20 times.
