@@ -166,11 +166,25 @@ void order_asset(const EnvironmentMapsParameters& parameters, MapsLight& light, 
   }
 }
 
+// The order reaches up to packing: eight bits a channel have one error at any price.
+Effect asset_effect(const MapsLight&) {
+  return {
+      "asset", true,
+      "A glTF asset lit by the map is ordered. Its levels are made to the order; the RGBD images "
+      "that the format asks for then round each channel by up to " +
+          short_number(100 * kRgbdStep) +
+          " % of its texel's largest, at any order, and the document tells what that changed.",
+      kRgbdStep};
+}
+
 }  // namespace
 
 const MapsProduct kAssetProduct = {
-    "asset", "A glTF asset lit by the map is ordered.", true,
+    "asset",
+    "A glTF asset lit by the map is ordered.",
+    true,
     [](const EnvironmentMapsParameters& parameters) { return parameters.asset.has_value(); },
-    order_asset};
+    order_asset,
+    asset_effect};
 
 }  // namespace lightkiln

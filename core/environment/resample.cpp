@@ -105,22 +105,47 @@ struct Place {
   double longitude, sine;
 };
 
-// A great circle whose summit lies at `summit` of those longitudes.
+// A great circle whose summit lies at -1, 0 or 1 quarter turns of those longitudes.
 struct Line {
   double height;  // A
-  double summit;
+  int quarter;
+  double summit() const { return quarter * (kPi / 2); }
   double k() const { return height / std::sqrt(1 + height * height); }
   double tangent(double sine) const { return height * std::sqrt((1 - sine) * (1 + sine)); }
 };
 
-// Column borders of the map as seen from a side face.
-struct Borders {
-  double centre;
-  int width;
-  double longitude(int column) const { return (double(column) / width - centre) * 2 * kPi; }
-  int column_of(double longitude) const {
-    return static_cast<int>(std::floor((longitude / (2 * kPi) + centre) * width));
+// Column borders of the map as seen from a side face, from the column before `begin` to the one
+// after `end`, with what a walk asks of each.
+class Borders {
+ public:
+  Borders(const SideFace& side, int width, double begin, double end)
+      : centre_(side.centre), width_(width), first_(column_of(begin) - 1) {
+    for (int column = first_; column <= column_of(end) + 2; ++column) {
+      const double at = (double(column) / width - centre_) * 2 * kPi;
+      places_.push_back({at, std::sin(at), std::cos(at)});
+    }
   }
+  int column_of(double longitude) const {
+    return static_cast<int>(std::floor((longitude / (2 * kPi) + centre_) * width_));
+  }
+  int first() const { return first_; }
+  int last() const { return first_ + static_cast<int>(places_.size()) - 2; }
+  double longitude(int column) const { return at(column).longitude; }
+  // Of the longitude from a summit at that many quarter turns.
+  double sine(int column, int quarter) const {
+    const Border& border = at(column);
+    return quarter == 0 ? border.sine : -quarter * border.cosine;
+  }
+
+ private:
+  struct Border {
+    double longitude, sine, cosine;
+  };
+  const Border& at(int column) const { return places_[static_cast<size_t>(column - first_)]; }
+
+  double centre_;
+  int width_, first_;
+  std::vector<Border> places_;
 };
 
 // Walks along one side of a line's summit, longitude growing, from `from` over every place of
@@ -129,7 +154,7 @@ template <typename Ends, typename Add>
 void walk(const Grid& grid, const ColumnSums& sums, const Borders& borders, const Line& line,
           const Place& from, const Ends& ends, const Add& add) {
   const double k = line.k();
-  const bool rising = from.longitude < line.summit;  // towards it
+  const bool rising = from.longitude < line.summit();  // towards it
   // Towards the equator rows grow north of it and fall south of it.
   const int way = (line.height > 0) != rising ? 1 : -1;
   int row = grid.row_of(line.tangent(from.sine));
@@ -144,7 +169,7 @@ void walk(const Grid& grid, const ColumnSums& sums, const Borders& borders, cons
     if (ratio > 1 && !rising) return place;
     if (!(ratio >= 0 && ratio <= 1)) return kNever;
     next_sine = (rising ? -1 : 1) * std::sqrt((1 - ratio) * (1 + ratio));
-    return std::max(place, line.summit + (rising ? -1 : 1) * std::acos(ratio));
+    return std::max(place, line.summit() + (rising ? -1 : 1) * std::acos(ratio));
   };
   double next_row = next_row_from(at);
   for (size_t i = 0; i < ends.size(); ++i) {
@@ -156,7 +181,7 @@ void walk(const Grid& grid, const ColumnSums& sums, const Borders& borders, cons
       if (step > 0) {
         const double sine = to == end.longitude ? end.sine
                             : to == next_row    ? next_sine
-                                                : std::sin(to - line.summit);
+                                                : borders.sine(column + 1, line.quarter);
         const double reached = std::asin(k * sine);
         const ColumnSums::Texel& texel = sums.at(column, row);
         sum += texel.constant * step - texel.radiance * (reached - integral);
@@ -191,9 +216,8 @@ void fill_side_columns(const Grid& grid, int begin, int end, Image* cube) {
   const int last_row = grid.map.height - 1 - first_row;
   std::vector<Place> ends;
   for (const SideFace& side : kSides) {
-    const Borders borders{side.centre, grid.map.width};
-    const ColumnSums sums(grid, borders.column_of(edge(begin).longitude) - 1,
-                          borders.column_of(edge(end).longitude) + 1, first_row, last_row, false);
+    const Borders borders(side, grid.map.width, edge(begin).longitude, edge(end).longitude);
+    const ColumnSums sums(grid, borders.first(), borders.last(), first_row, last_row, false);
     for (int j = 0; j <= size; ++j) {
       const Line line{1 - 2.0 * j / size, 0};
       std::fill(below.begin(), below.end(), Vec3d{});
@@ -282,9 +306,10 @@ void walk_eta(const Grid& grid, const ColumnSums& sums, const Borders& borders,
 void walk_xi(const Grid& grid, const ColumnSums& sums, const Borders& borders, const Sector& sector,
              int i, std::vector<Vec3d>* cells) {
   const int size = sector.size;
-  const double x = sector.grid_line(i), side = x > 0 ? 1 : -1;
+  const double x = sector.grid_line(i);
+  const int side = x > 0 ? 1 : -1;
   if (std::abs(x) < 1e-12) return;  // a meridian
-  const Line line{1 / std::abs(x), side * kPi / 2};
+  const Line line{1 / std::abs(x), side};
   const auto place = [&](double eta) {
     return Place{std::atan(x / eta), -side * eta / std::sqrt(x * x + eta * eta)};
   };
@@ -315,9 +340,8 @@ void fill_pole(const Grid& grid, bool north, Image* cube, Progress& progress) {
   std::vector<Vec3d> cells(static_cast<size_t>(size) * static_cast<size_t>(size));
   const int last_row = std::min(grid.map.height - 1, grid.row_of(std::sqrt(0.5)) + 1);
   for (const SideFace& side : kSides) {
-    const Borders borders{side.centre, grid.map.width};
-    const ColumnSums sums(grid, borders.column_of(-kPi / 4) - 1, borders.column_of(kPi / 4) + 1, 0,
-                          last_row, !north);
+    const Borders borders(side, grid.map.width, -kPi / 4, kPi / 4);
+    const ColumnSums sums(grid, borders.first(), borders.last(), 0, last_row, !north);
     const Sector sector(size, north, side);
     for (int i = 1; i <= size; ++i) {
       if (i % 64 == 0) progress.update(0.5);

@@ -11,6 +11,9 @@ namespace lightkiln {
 
 // The brightest value: colour 1 divided by 1/255.
 inline constexpr double kMaxRgbd = 255;
+// The largest error of a channel relative to its texel's largest one, where that is above 1 and not
+// cut: half a step of the colour, 2.2 / 510 at 1, where a divisor of 1 leaves it at half, code 186.
+inline constexpr double kRgbdStep = 0.006;
 
 // What packing changed.
 struct RgbdLoss {

@@ -106,8 +106,10 @@ TEST(MapsAsset, HoldsTheLevelsOfTheChainAndTellsWhatPackingChanged) {
   EnvironmentMapsParameters parameters;
   parameters.asset = AssetOutput{64, AssetRoughness::linear};
   parameters.prefilter = PrefilterOutput{64, 3};
-  const Assembly result = bake(reference::test_sky(64, 1e4), parameters);
+  Plan plan;
+  const Assembly result = bake(reference::test_sky(64, 1e4), parameters, &plan);
   const AssetDocument& document = document_of(result);
+  double worst_share = 0;  // of a texel's largest channel
   const auto& chain = std::get<EnvironmentDocument>(result.document).prefilter;
   const std::vector<Image8> images = images_of(bytes_of(result, document.artifact));
   const double mean = luminance(std::get<EnvironmentDocument>(result.document).mean);
@@ -129,7 +131,9 @@ TEST(MapsAsset, HoldsTheLevelsOfTheChainAndTellsWhatPackingChanged) {
         if (top > 255) truth *= 255 / top, ++cut;
         const Vec3d error = decode_rgbd(&image.pixels[4 * i]) - truth;
         squares += dot(error, error);
-        largest = std::max({largest, std::abs(error.x), std::abs(error.y), std::abs(error.z)});
+        const double most = std::max({std::abs(error.x), std::abs(error.y), std::abs(error.z)});
+        largest = std::max(largest, most);
+        if (top > 1 && top <= 255) worst_share = std::max(worst_share, most / top);
       }
     }
     EXPECT_EQ(level.cut_texels, cut);
@@ -140,6 +144,13 @@ TEST(MapsAsset, HoldsTheLevelsOfTheChainAndTellsWhatPackingChanged) {
     EXPECT_GT(level.packing_rms, 0);
   }
   EXPECT_GT(document.levels[0].cut_texels, 0u);  // the sun of 1e4
+  // No order reaches packing, and the plan says by how much.
+  const auto asset = std::find_if(plan.effects.begin(), plan.effects.end(),
+                                  [](const Effect& effect) { return effect.name == "asset"; });
+  ASSERT_NE(asset, plan.effects.end());
+  EXPECT_EQ(asset->bound, kRgbdStep);
+  EXPECT_LE(worst_share, kRgbdStep);
+  EXPECT_GT(worst_share, 0.5 * kRgbdStep);
 }
 
 TEST(MapsAsset, WarnsOfWhatTheFormatCannotHold) {
