@@ -19,12 +19,16 @@ namespace lightkiln {
 ConvolvedCube::ConvolvedCube(MapsLight& light, int size, std::optional<Lobe> lobe, double scale,
                              double target)
     : size_(size), lobe_(lobe), scale_(scale), constant_(light.constant()) {
-  if (lobe_ && !constant_) plan_ = plan_lobe(light.statistics(), *lobe_, target);
+  if (constant_) return;
+  if (lobe_)
+    plan_ = plan_lobe(light.statistics(), *lobe_, target);
+  else
+    rounding_ = kResampleRounding * std::hypot(1, light.statistics().spread);
 }
 
 double ConvolvedCube::error_bound() const {
   if (constant_) return 0;
-  return lobe_ ? plan_.error_bound : kResampleError;
+  return lobe_ ? plan_.error_bound : rounding_;
 }
 
 SpectrumNeed ConvolvedCube::spectrum_need() const {

@@ -52,6 +52,8 @@ class ConvolvedCube : public MapsOutput {
   double scale_;
   bool constant_;
   LobePlan plan_;  // empty when nothing is convolved
+  // Of the map itself on a cube: every texel's, of which the mean square is at most 1 + spread^2.
+  double rounding_ = 0;
 };
 
 }  // namespace lightkiln

@@ -243,6 +243,25 @@ TEST(EnvironmentMaps, KeepEveryOrderAndPriceItByWhatItTakes) {
   }
 }
 
+// The map itself on a cube is exact but for rounding to float, which a sun makes large against the
+// mean: level 0's bound knows the map.
+TEST(EnvironmentMaps, StateWhatRoundingLeavesOfTheMapItself) {
+  EnvironmentMapsParameters parameters;
+  parameters.prefilter = PrefilterOutput{.size = 16, .levels = 2};
+  double last = 0;
+  for (const double sun : {10.0, 1e6}) {
+    Spec spec = order(parameters);
+    spec.accuracy.check_texels = 0;
+    const Image sky = reference::test_sky(64, sun);
+    const EnvironmentDocument document = document_of(bake(spec, exr_of(sky)));
+    const double bound = document.prefilter[0].error_bound;
+    EXPECT_LT(bound, 1e-4);
+    EXPECT_GT(bound, last);
+    last = bound;
+  }
+  EXPECT_GT(last, 1e-6);
+}
+
 // The default order's coefficients err by at most 1e-6 of L00, and a table of 1e-5 by at most that.
 TEST(EnvironmentMaps, KeepTheFiguresOfCoefficientsAndTables) {
   EnvironmentMapsParameters parameters;
