@@ -30,10 +30,14 @@ bool is_interior(const MapLayout& layout, int chart, int x, int y) {
   return safe > 0 && right * right + down * down < safe * safe;
 }
 
-Vec3d bilinear(const MapLayout& layout, const Image& image, const MapPlace& place) {
+// `blend` may be null.
+Vec3d bilinear(const MapLayout& layout, const Image& image, const MapPlace& place,
+               const RowBlend* blend) {
   const double px = place.x - 0.5, py = place.y - 0.5;
   const int x = floor_to_int(px), y = floor_to_int(py);
-  const double fx = px - x, fy = py - y;
+  const double fx = px - x;
+  double fy = py - y;
+  if (blend != nullptr) fy += (*blend)(y)*fy * (1 - fy);
   if (is_interior(layout, place.chart, x, y)) {
     const float* top = image.at(x, y);
     const float* bottom = image.at(x, y + 1);
@@ -63,27 +67,37 @@ MapPlace at_radius(const MapLayout& layout, const MapPlace& place, double scale)
 
 }  // namespace
 
-Vec3d nearest_radiance(const MapLayout& layout, const Image& image, const MapPlace& place) {
-  const int x = std::clamp(static_cast<int>(place.x), 0, layout.width - 1);
-  const int y = std::clamp(static_cast<int>(place.y), 0, layout.height - 1);
-  if (is_radial(layout.kind) && !texel_has_direction(layout, x, y)) {
-    // A texel that the rim cuts, with its sample outside: a texel further in.
+void find_value(const MapLayout& layout, int* x, int* y) {
+  if (!is_radial(layout.kind)) return;
+  MapPlace place{*x + 0.5, *y + 0.5};
+  while (!texel_has_direction(layout, *x, *y)) {
     const double radius = std::hypot(place.x - 0.5 * layout.width, place.y - 0.5 * layout.width);
-    return nearest_radiance(layout, image, at_radius(layout, place, 1 - 0.75 / radius));
+    place = at_radius(layout, place, 1 - 0.75 / radius);
+    *x = std::clamp(static_cast<int>(place.x), 0, layout.width - 1);
+    *y = std::clamp(static_cast<int>(place.y), 0, layout.height - 1);
   }
+}
+
+Vec3d nearest_radiance(const MapLayout& layout, const Image& image, const MapPlace& place) {
+  int x = std::clamp(static_cast<int>(place.x), 0, layout.width - 1);
+  int y = std::clamp(static_cast<int>(place.y), 0, layout.height - 1);
+  find_value(layout, &x, &y);
   return to_double(image.rgb(x, y));
 }
 
-Vec3d smooth_radiance(const MapLayout& layout, const Image& image, const MapPlace& place) {
-  if (!is_radial(layout.kind)) return bilinear(layout, image, place);
+namespace {
+
+Vec3d interpolate(const MapLayout& layout, const Image& image, const MapPlace& place,
+                  const RowBlend* blend) {
+  if (!is_radial(layout.kind)) return bilinear(layout, image, place, blend);
   const double half = 0.5 * layout.width;
   const double radius = std::hypot(place.x - half, place.y - half);
   // Nearer to the rim than half a texel's diagonal the four samples around a place may all lie
   // outside; further in one of them has a quarter of the weight.
   const double inner_radius = std::max(0.0, half - 0.7072);
-  if (radius <= std::min(inner_radius, half - 1)) return bilinear(layout, image, place);
+  if (radius <= std::min(inner_radius, half - 1)) return bilinear(layout, image, place, blend);
   const auto at = [&](double scale) {
-    return bilinear(layout, image, at_radius(layout, place, scale));
+    return bilinear(layout, image, at_radius(layout, place, scale), blend);
   };
   const Vec3d inner = at(std::min(radius, inner_radius) / radius);
   if (radial_limit(layout) < kPi) return inner;
@@ -95,9 +109,29 @@ Vec3d smooth_radiance(const MapLayout& layout, const Image& image, const MapPlac
   for (int k = 0; k < kRimPlaces; ++k) {
     const double angle = 2 * kPi * (k + 0.5) / kRimPlaces;
     rim += bilinear(layout, image,
-                    {half + inner_radius * std::cos(angle), half + inner_radius * std::sin(angle)});
+                    {half + inner_radius * std::cos(angle), half + inner_radius * std::sin(angle)},
+                    blend);
   }
   return inner * (1 - share) + rim * (share / kRimPlaces);
+}
+
+}  // namespace
+
+Vec3d smooth_radiance(const MapLayout& layout, const Image& image, const MapPlace& place) {
+  return interpolate(layout, image, place, nullptr);
+}
+
+Vec3d smooth_radiance(const MapLayout& layout, const Image& image, const MapPlace& place,
+                      const RowBlend& blend) {
+  return interpolate(layout, image, place, &blend);
+}
+
+RowBlend::RowBlend(const MapLayout& layout) {
+  if (layout.kind != LayoutKind::latlong && layout.kind != LayoutKind::cylinder) return;
+  for (int j = 0; j + 1 < layout.height; ++j) {
+    const auto density = [&](double y) { return solid_angle_density(layout, 1, y); };
+    between_.push_back((density(j + 1.5) - density(j + 0.5)) / (4 * density(j + 1)));
+  }
 }
 
 }  // namespace lightkiln

@@ -1,6 +1,6 @@
 #pragma once
 
-// Exact areas that a small polygon covers of the texels of a grid.
+// What a small polygon covers of the texels of a grid: exact areas and moments.
 
 #include <cstddef>
 #include <vector>
@@ -9,6 +9,12 @@ namespace lightkiln {
 
 struct GridPoint {
   double x = 0, y = 0;
+};
+
+// Integrals over the covered part of a texel of 1, u, v, u v and v^2, where (u, v) runs from the
+// texel's centre, -1/2 to 1/2.
+struct CoveredMoments {
+  double area = 0, u = 0, v = 0, uv = 0, vv = 0;
 };
 
 class PolygonCoverage {
@@ -21,17 +27,18 @@ class PolygonCoverage {
   int right() const { return left_ + columns_ - 1; }
   int top() const { return top_; }
   int bottom() const { return top_ + rows_ - 1; }
-  // Area of the polygon inside texel (x, y), in [0, 1] up to rounding.
-  double area(int x, int y) const {
-    return areas_[static_cast<size_t>(y - top_) * static_cast<size_t>(columns_ + 2) +
-                  static_cast<size_t>(x - left_)];
+  // Of texel (x, y); areas in [0, 1] up to rounding.
+  const CoveredMoments& moments(int x, int y) const {
+    return texels_[static_cast<size_t>(y - top_) * static_cast<size_t>(columns_ + 2) +
+                   static_cast<size_t>(x - left_)];
   }
+  double area(int x, int y) const { return moments(x, y).area; }
 
  private:
   void add_edge(GridPoint from, GridPoint to);
 
   int left_ = 0, top_ = 0, columns_ = 0, rows_ = 0;
-  std::vector<double> areas_;
+  std::vector<CoveredMoments> texels_;
 };
 
 }  // namespace lightkiln

@@ -13,7 +13,39 @@ double shown_share(const MapLayout& layout, int i, int count) {
   return i == 0 || i == count - 1 ? 0.5 : 1;
 }
 
+// The middle of that part, from the texel's centre.
+double shown_middle(const MapLayout& layout, int i, int count) {
+  if (shown_share(layout, i, count) == 1) return 0;
+  return i == 0 ? 0.25 : -0.25;
+}
+
 }  // namespace
+
+// Two Gauss points a side give the mean to the fourth order of a texel, and the slopes.
+void TexelDensity::add(const MapLayout& layout, int x, int y, bool by_row, double mean) {
+  const double half = 0.5 / std::sqrt(3.0);
+  const int rows = is_cube(layout.kind) ? layout.width : layout.height;
+  const double cx = shown_middle(layout, x, layout.width), cy = shown_middle(layout, y, rows);
+  const double reach = half * (cx == 0 && cy == 0 ? 1 : 0.5);
+  const auto at = [&](double dx, double dy) {
+    return solid_angle_density(layout, x + 0.5 + cx + dx * reach, y + 0.5 + cy + dy * reach);
+  };
+  double along_x = 0, along_y = 0, sum = 0;
+  if (by_row) {
+    const double above = at(0, -1), below = at(0, 1);
+    along_y = (below - above) / (2 * reach);
+    sum = 0.5 * (above + below);
+  } else {
+    const double a = at(-1, -1), b = at(1, -1), c = at(-1, 1), d = at(1, 1);
+    along_x = (b - a + d - c) / (4 * reach);
+    along_y = (c - a + d - b) / (4 * reach);
+    sum = 0.25 * (a + b + c + d);
+  }
+  const double exact = mean > 0 ? mean : sum;
+  means_.push_back(static_cast<float>(exact));
+  texels_.push_back({static_cast<float>(exact - along_x * cx - along_y * cy),
+                     static_cast<float>(along_x), static_cast<float>(along_y)});
+}
 
 TexelDensity::TexelDensity(const MapLayout& layout) {
   const bool by_row = layout.kind == LayoutKind::latlong || layout.kind == LayoutKind::cylinder ||
@@ -27,31 +59,26 @@ TexelDensity::TexelDensity(const MapLayout& layout) {
     for (int y = 0; y < rows_; ++y) {
       for (int x = 0; x < columns_; ++x) {
         const double shown = shown_share(strip, x, columns_) * shown_share(strip, y, rows_);
-        values_.push_back(static_cast<float>(texel_solid_angle(strip, x, y) / shown));
+        add(strip, x, y, false, texel_solid_angle(strip, x, y) / shown);
       }
     }
     return;
   }
   rows_ = layout.height;
   columns_ = by_row ? 1 : layout.width;
-  values_.reserve(static_cast<size_t>(rows_) * static_cast<size_t>(columns_));
-  // Two Gauss points a side are exact to the fourth order of a texel.
-  const double half = 0.5 / std::sqrt(3.0);
+  const size_t count = static_cast<size_t>(rows_) * static_cast<size_t>(columns_);
+  means_.reserve(count);
+  texels_.reserve(count);
   for (int y = 0; y < rows_; ++y) {
     for (int x = 0; x < columns_; ++x) {
-      double value = 0;
       if (by_row) {
         const int inner = std::min(1, layout.width - 1);
-        value = texel_solid_angle(layout, inner, y) / shown_share(layout, y, rows_) /
-                shown_share(layout, inner, layout.width);
-      } else if (texel_has_direction(layout, x, y)) {
-        for (const double dx : {-half, half}) {
-          for (const double dy : {-half, half}) {
-            value += 0.25 * solid_angle_density(layout, x + 0.5 + dx, y + 0.5 + dy);
-          }
-        }
+        add(layout, inner, y, true,
+            texel_solid_angle(layout, inner, y) / shown_share(layout, y, rows_) /
+                shown_share(layout, inner, layout.width));
+      } else {
+        add(layout, x, y, false, 0);
       }
-      values_.push_back(static_cast<float>(value));
     }
   }
 }
