@@ -1,5 +1,7 @@
 #include "proto/layouts_json.h"
 
+#include "proto/harmonics_json.h"
+
 namespace lightkiln {
 namespace {
 
@@ -58,8 +60,9 @@ void write_layouts(JsonWriter& writer, const std::vector<LayoutDocument>& layout
         .member("height", faces ? entry.layout.width : entry.layout.height);
     write_form(writer, entry.layout);
     writer.member("covered_share", covered_solid_angle(entry.layout) / (4 * kPi))
-        .member("error_bound", entry.error_bound)
-        .key("round_trip");
+        .member("error_bound", entry.error_bound);
+    write_measured(writer, entry.measured);
+    writer.key("round_trip");
     if (entry.round_trip)
       write_round_trip(writer, *entry.round_trip);
     else

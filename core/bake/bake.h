@@ -144,7 +144,10 @@ struct LayoutDocument {
   std::string name;                     // as ordered: "octahedral"
   std::vector<std::string> artifacts;   // one; of cube_faces six, +X -X +Y -Y +Z -Z
   MapLayout layout;                     // of cube_faces: the strip of its faces
-  double error_bound = 0;               // rms of a texel's mean; 0 where texels are only moved
+  // Of a texel's value, relative to the source's mean or to the brightest texel that it shows,
+  // whichever is more: rms. 0 where texels are only moved.
+  double error_bound = 0;
+  MeasuredError measured;
   std::optional<RoundTrip> round_trip;  // none when nothing was to be checked
 };
 // The irradiance that `lights` directional lights give, against the map's at 1024 normals: relative

@@ -186,7 +186,7 @@ double model_seconds(MapsLight& light, const MapsOutputs& outputs, int check_tex
     seconds += row * width * height + kLegendrePerTerm * points * height * bands * bands;
   }
   for (const auto& output : outputs) {
-    seconds += output->model_seconds(light);
+    seconds += output->model_seconds(light) + output->check_seconds(light) * check_texels;
     if (output->spectrum_need().lobe) seconds += kBrutePerTexel * width * height * check_texels;
   }
   return seconds;

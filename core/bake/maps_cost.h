@@ -15,7 +15,12 @@ inline constexpr double kPerTexel = 4e-8;            // interpolation
 inline constexpr double kPerBrightPoint = 3e-9;
 inline constexpr double kPerCorePoint = 4e-9;
 inline constexpr double kResamplePerCell = 1.5e-8;
-inline constexpr double kConvertPerTexel = 1.5e-6;  // of another layout
+// Another layout: by what convert_layout() counts.
+inline constexpr double kConvertPerPlace = 4.5e-8;
+inline constexpr double kConvertPerPolygon = 8e-8;
+inline constexpr double kConvertPerCovered = 5.4e-8;
+inline constexpr double kConvertPerPoint = 1.1e-7;
+inline constexpr double kConvertPerCheck = 1.2e-3;  // and as much for each source texel across one
 inline constexpr double kLookUpPerTexel = 2.5e-7;   // of the source, for the round trip
 inline constexpr double kPerDfgPoint = 3.1e-9;
 inline constexpr double kPerCharliePoint = 9e-9;

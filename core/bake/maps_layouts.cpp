@@ -1,14 +1,15 @@
 // The map in other layouts, converted from the file's own pixels.
 
+#include "core/bake/maps_layouts.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "core/bake/maps_cost.h"
 #include "core/bake/maps_output.h"
+#include "core/base/parallel.h"
 #include "core/base/text.h"
-#include "core/environment/layout_convert.h"
-#include "core/environment/resample.h"
 #include "core/image/exr.h"
 
 namespace lightkiln {
@@ -54,53 +55,80 @@ std::string describe(const MapLayout& layout) {
 
 constexpr std::array<const char*, 6> kFaceNames = {"px", "nx", "py", "ny", "pz", "nz"};
 
+// Beyond this an order is coarse enough to be met by what costs least.
+constexpr double kCoarsest = 0.05;
+
 class LayoutImage : public MapsOutput {
  public:
-  LayoutImage(size_t product, const LayoutOutput& order, const Environment& environment)
+  // `target` is the order that a bound of the whole is held to; a layout errs texel by texel.
+  LayoutImage(size_t product, const LayoutOutput& order, const Environment& environment,
+              double target)
       : product_(product), layout_(layout_of(product, order)) {
-    const bool moved = moves_texels(environment.source_image_layout(), layout_,
-                                    environment.source_image_rotation());
-    bound_ = moved || environment.constant ? 0 : kResampleError;
+    moved_ = moves_texels(environment.source_image_layout(), layout_,
+                          environment.source_image_rotation());
+    exact_ = moved_ || environment.constant;
+    constexpr double kUsed = 0.9;
+    error_ = std::min(kCoarsest, kUsed * ordered_error(target));
   }
 
-  double error_bound() const override { return bound_; }
+  double error_bound() const override { return exact_ ? 0 : error_; }
 
   double model_seconds(MapsLight& light) const override {
     const Image& source = light.environment().source_image();
-    return kConvertPerTexel * layout_.width * layout_.height +
-           kLookUpPerTexel * std::min(1e6, double(source.width) * source.height);
+    const double texels = double(source.width) * source.height;
+    double seconds = kLookUpPerTexel * std::min(1e6, texels);
+    if (moved_) return seconds;
+    const ConversionWork work =
+        estimate_conversion(light.conversion_source(), layout_,
+                            light.environment().source_image_rotation(), kFilter, error_);
+    if (work.walked) {
+      const double size = cube_face_size(layout_);
+      return seconds + kResamplePerCell * (source.width + 4 * size) * (source.height + 2 * size);
+    }
+    return seconds + kConvertPerPlace * work.places + kConvertPerPolygon * work.polygons +
+           kConvertPerCovered * work.covered + kConvertPerPoint * work.points;
+  }
+
+  double check_seconds(MapsLight& light) const override {
+    if (exact_) return 0;
+    const Image& source = light.environment().source_image();
+    const double across =
+        std::sqrt(double(source.width) * source.height / (double(layout_.width) * layout_.height));
+    return kConvertPerCheck * (1 + across);
   }
 
   // Bytes: pixels, then what the round trip lost; it is measured when anything is to be checked.
   MeasuredError make(MapsLight& light, int check_texels, ByteWriter& writer,
                      Progress& progress) const override {
     const Environment& environment = light.environment();
-    const MapLayout from = environment.source_image_layout();
     const Rotation rotation = environment.source_image_rotation();
-    const Image& source = environment.source_image();
-    const Image image = convert_layout(from, source, layout_, rotation, MapFilter::adaptive,
-                                       light.threads(), progress);
+    const ConversionSource& source = light.conversion_source();
+    const Image image =
+        convert_layout(source, layout_, rotation, kFilter, error_, light.threads(), progress);
     writer.floats(image.pixels);
     writer.u64(check_texels > 0 ? 1 : 0);
     if (check_texels == 0) return {};
-    const RoundTrip trip =
-        measure_round_trip(from, source, layout_, image, rotation, light.threads(), progress);
+    const RoundTrip trip = measure_round_trip(source.layout, *source.image, layout_, image,
+                                              rotation, light.threads(), progress);
     writer.f64(trip.relative_rms);
     writer.u64(trip.psnr_db ? 1 : 0);
     writer.f64(trip.psnr_db.value_or(0));
     writer.f64(trip.not_covered_share);
     writer.f64(trip.mean_before);
     writer.f64(trip.mean_after);
-    return {};
+    if (exact_) return {};
+    return check_layout(source, layout_, image, rotation, kFilter, check_texels, light.threads(),
+                        progress);
   }
 
-  void file(ByteReader& reader, const MeasuredError&, MapsResult* result) const override {
+  void file(ByteReader& reader, const MeasuredError& measured, MapsResult* result) const override {
     Image image(layout_.width, layout_.height, 3);
     reader.floats(image.pixels);
     LayoutDocument entry;
     entry.name = layout_product_name(product_);
     entry.layout = layout_;
-    entry.error_bound = bound_;
+    entry.error_bound = error_bound();
+    entry.measured = measured;
     if (reader.u64() != 0) entry.round_trip = read_trip(reader);
     const std::string stem = "layout_" + entry.name;
     if (product_ == kCubeFaces) {
@@ -125,6 +153,8 @@ class LayoutImage : public MapsOutput {
   }
 
  private:
+  static constexpr MapFilter kFilter = MapFilter::adaptive;
+
   static RoundTrip read_trip(ByteReader& reader) {
     RoundTrip trip;
     trip.relative_rms = reader.f64();
@@ -155,20 +185,57 @@ class LayoutImage : public MapsOutput {
 
   size_t product_;
   MapLayout layout_;
-  double bound_;
+  double error_;
+  bool moved_, exact_;
 };
+
+}  // namespace
+
+MeasuredError check_layout(const ConversionSource& source, const MapLayout& layout,
+                           const Image& image, const Rotation& rotation, MapFilter filter,
+                           int check_texels, int threads, Progress& progress) {
+  struct Texel {
+    int x, y;
+    LayoutTruth truth;
+  };
+  std::vector<Texel> texels;
+  const size_t width = static_cast<size_t>(layout.width);
+  const size_t all = width * static_cast<size_t>(layout.height);
+  // Of those that show something: half of some layouts does not.
+  for (int i = 0; i < 8 * check_texels && texels.size() < static_cast<size_t>(check_texels); ++i) {
+    const size_t index = check_index(i, all);
+    const int x = static_cast<int>(index % width), y = static_cast<int>(index / width);
+    if (texel_has_direction(layout, x, y)) texels.push_back({x, y, {}});
+  }
+  parallel_blocks(
+      texels.size(), 1, threads, progress,
+      [&](size_t i, size_t) {
+        Texel& t = texels[i];
+        t.truth = layout_truth(source.layout, *source.image, layout, rotation, filter, t.x, t.y);
+      },
+      1, 1);
+  ErrorMeter meter(1);
+  for (const Texel& t : texels) {
+    const double scale = std::max(source.mean, t.truth.brightest);
+    const double share = scale > 0 ? 1 / scale : 1;
+    meter.add(to_double(image.rgb(t.x, t.y)) * share, t.truth.radiance * share);
+  }
+  return meter.result();
+}
+
+namespace {
 
 bool any_ordered(const EnvironmentMapsParameters& parameters) {
   return std::any_of(parameters.layouts.begin(), parameters.layouts.end(),
                      [](const auto& order) { return order.has_value(); });
 }
 
-void order_layouts(const EnvironmentMapsParameters& parameters, MapsLight& light, double,
+void order_layouts(const EnvironmentMapsParameters& parameters, MapsLight& light, double target,
                    MapsOutputs* outputs) {
   for (size_t product = 0; product < kLayoutProducts; ++product) {
     const std::optional<LayoutOutput>& order = parameters.layouts[product];
     if (!order) continue;
-    outputs->push_back(std::make_unique<LayoutImage>(product, *order, light.environment()));
+    outputs->push_back(std::make_unique<LayoutImage>(product, *order, light.environment(), target));
   }
 }
 

@@ -14,6 +14,14 @@ const LightStatistics& MapsLight::statistics() {
   return *statistics_;
 }
 
+const ConversionSource& MapsLight::conversion_source() {
+  if (!conversion_source_) {
+    conversion_source_ = std::make_unique<const ConversionSource>(
+        environment_.source_image_layout(), environment_.source_image());
+  }
+  return *conversion_source_;
+}
+
 void MapsLight::require(const ShNeed& sh, std::span<const LobePlan> lobes) {
   sh_ = sh;
   lobes_.assign(lobes.begin(), lobes.end());

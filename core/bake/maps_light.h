@@ -3,9 +3,11 @@
 // What the outputs of one environment_maps bake share: the map as they see it, what is known of its
 // light, and its coefficients, each made when the first output asks for it.
 
+#include <memory>
 #include <optional>
 #include <span>
 
+#include "core/environment/layout_convert.h"
 #include "core/environment/prefilter.h"
 #include "core/environment/sun_extraction.h"
 
@@ -28,6 +30,10 @@ class MapsLight {
   const LightStatistics& statistics();
   bool measured() const { return statistics_.has_value(); }
 
+  // What other layouts are converted from. Points into this object, which stays where it is from
+  // then on.
+  const ConversionSource& conversion_source();
+
   // What all outputs of the bake need together, so that coefficients do not depend on which output
   // comes first.
   void require(const ShNeed& sh, std::span<const LobePlan> lobes);
@@ -42,6 +48,7 @@ class MapsLight {
   std::optional<SunExtraction> sun_;
   int threads_;
   std::optional<LightStatistics> statistics_;
+  std::unique_ptr<const ConversionSource> conversion_source_;
   ShNeed sh_;
   std::vector<LobePlan> lobes_;
   std::optional<LatlongSpectrum> spectrum_;

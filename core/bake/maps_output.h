@@ -38,6 +38,8 @@ class MapsOutput {
   virtual SpectrumNeed spectrum_need() const { return {}; }
   // CPU seconds on the model's core (maps_cost.h) beside those of the shared coefficients.
   virtual double model_seconds(MapsLight& light) const = 0;
+  // The same of holding one texel against the twin, where that is not a pass over the map.
+  virtual double check_seconds(MapsLight&) const { return 0; }
   // Of what the ordered form cannot hold, for the plan; "" = nothing.
   virtual std::string warning(MapsLight&) const { return {}; }
   // Writes the output's values: a pure function of spec and inputs. `check_texels` of them (texels,

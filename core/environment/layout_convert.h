@@ -40,9 +40,6 @@ struct ConversionSource {
   TexelDensity density;
   RowBlend blend;
   double mean = 0;  // luminance over what the layout covers
-  // How far texels differ from their neighbours: root mean square over the sphere of the range
-  // within 3 x 3 of them, relative to `mean` or to the brightest of them, whichever is more.
-  double contrast = 0;
 };
 
 // Of an environment that is read.
@@ -58,7 +55,7 @@ struct ConversionWork {
   double polygons = 0;  // laid over a grid
   double covered = 0;   // texels under them
   double points = 0;    // interpolated
-  bool walked = false;  // by resample_to_cube() instead
+  bool walked = false;  // in closed form, by resample_to_cube()
 };
 // Estimated from a few hundred texels.
 ConversionWork estimate_conversion(const ConversionSource& source, const MapLayout& to,

@@ -36,8 +36,10 @@ struct Baked {
   }
 };
 
-Baked bake(const EnvironmentMapsParameters& parameters, const std::vector<std::byte>& file) {
-  const Spec spec = test::order(parameters);
+Baked bake(const EnvironmentMapsParameters& parameters, const std::vector<std::byte>& file,
+           std::optional<double> error = {}) {
+  Spec spec = test::order(parameters);
+  spec.accuracy.target_error = error;
   EXPECT_TRUE(validate(spec).empty());
   Baked baked;
   baked.assembly = test::bake(spec, file, 0, &baked.plan);
@@ -72,6 +74,9 @@ TEST(Layouts, WritesEveryLayoutAndSaysWhatItLost) {
     }
     ASSERT_TRUE(entry.round_trip) << entry.name;
     EXPECT_LT(entry.round_trip->relative_rms, 0.5) << entry.name;
+    // Held against the twin, but for the map itself.
+    EXPECT_EQ(entry.measured.count, entry.error_bound > 0 ? 4u : 0u) << entry.name;
+    EXPECT_LT(entry.measured.rms, 2e-3) << entry.name;
     const bool half = entry.name.starts_with("hemisphere");
     EXPECT_NEAR(entry.round_trip->not_covered_share,
                 half                       ? 0.5
@@ -86,6 +91,22 @@ TEST(Layouts, WritesEveryLayoutAndSaysWhatItLost) {
   EXPECT_FALSE(baked.effect("rotation").active);
   EXPECT_FALSE(baked.effect("source_layout").active);
   EXPECT_FALSE(baked.effect("harmonic_transform").active);
+}
+
+// An order is the bound, it sets the work, and the plan says so before.
+TEST(Layouts, AreMadeToTheOrderedError) {
+  const auto file = exr_of(reference::test_sky(64, 100));
+  EnvironmentMapsParameters parameters;
+  parameters.layouts[size_t(LayoutKind::angular)] = sized(96);
+  const Baked fine = bake(parameters, file, 1e-4), coarse = bake(parameters, file, 0.03);
+  EXPECT_LT(fine.document().layouts[0].error_bound, 1e-4);
+  EXPECT_LT(coarse.document().layouts[0].error_bound, 0.03);
+  EXPECT_GT(coarse.document().layouts[0].error_bound, 1e-3);
+  EXPECT_GT(fine.document().layouts[0].measured.count, 0u);
+  EXPECT_LE(fine.document().layouts[0].measured.rms, coarse.document().layouts[0].measured.rms);
+  ASSERT_EQ(fine.plan.prices.size(), 5u);
+  EXPECT_GT(fine.plan.prices.back().seconds, fine.plan.prices.front().seconds);
+  EXPECT_NE(fine.artifact("layout_angular.exr").bytes, coarse.artifact("layout_angular.exr").bytes);
 }
 
 TEST(Layouts, WritesTheEnvmapAttributeExactlyWithItsConvention) {

@@ -66,11 +66,8 @@ Baked bake_once(const Environment& map, const EnvironmentMapsParameters& paramet
   return baked;
 }
 
-Point measure(const Environment& map, const ParameterGroup& group, const std::string& name,
-              double target, const Order& order) {
-  Spec spec = empty_spec(Kind::environment_maps);
-  group.create(spec);
-  const auto& parameters = std::get<EnvironmentMapsParameters>(spec.parameters);
+Point measure(const Environment& map, const EnvironmentMapsParameters& parameters,
+              const std::string& name, double target, const Order& order) {
   const Baked checked = bake_once(map, parameters, target, order.checks);
   std::vector<double> seconds;
   for (int i = 0; i < order.repetitions; ++i)
@@ -78,24 +75,40 @@ Point measure(const Environment& map, const ParameterGroup& group, const std::st
   return {name, target, checked.bound, checked.measured, median(seconds), checked.bands};
 }
 
+void climb_one(const Environment& map, const EnvironmentMapsParameters& parameters,
+               const std::string& name, const Order& order, std::vector<Point>* points) {
+  for (const double target : kQuotedErrors) {
+    points->push_back(measure(map, parameters, name, target, order));
+    const Point& p = points->back();
+    std::printf("%-20s %9.1e %9.1e %11.2e %11.2e %9.4f %6d\n", p.product.c_str(), p.target, p.bound,
+                p.measured.rms, p.measured.max, p.cpu_s, p.bands);
+    std::fflush(stdout);
+    if (!order.whole_ladder) break;
+  }
+}
+
 std::vector<Point> climb(const Environment& map, const Order& order) {
   std::vector<Point> points;
-  std::printf("%-12s %9s %9s %11s %11s %9s %6s\n", "product", "ordered", "bound", "seen rms",
+  std::printf("%-20s %9s %9s %11s %11s %9s %6s\n", "product", "ordered", "bound", "seen rms",
               "seen max", "CPU s", "bands");
   for (const ParameterGroup& group : kind_table(Kind::environment_maps).groups) {
     const std::string name(group.path.substr(group.path.rfind('/') + 1));
     const auto products = maps_products();
     const bool product = std::any_of(products.begin(), products.end(),
                                      [&](const MapsProduct& p) { return name == p.name; });
-    if (!product || !group.create) continue;
-    for (const double target : kQuotedErrors) {
-      points.push_back(measure(map, group, name, target, order));
-      const Point& p = points.back();
-      std::printf("%-12s %9.1e %9.1e %11.2e %11.2e %9.4f %6d\n", p.product.c_str(), p.target,
-                  p.bound, p.measured.rms, p.measured.max, p.cpu_s, p.bands);
-      std::fflush(stdout);
-      if (!order.whole_ladder) break;
-    }
+    if (!product || !group.create || name == kLayoutsProduct.name) continue;
+    Spec spec = empty_spec(Kind::environment_maps);
+    group.create(spec);
+    climb_one(map, std::get<EnvironmentMapsParameters>(spec.parameters), name, order, &points);
+  }
+  for (const auto& [kind, size] :
+       {std::pair{LayoutKind::octahedral, 512}, std::pair{LayoutKind::horizontal_cross, 256},
+        std::pair{LayoutKind::angular, 512}}) {
+    EnvironmentMapsParameters parameters;
+    LayoutOutput output;
+    output.size = order.whole_ladder ? size : size / 16;
+    parameters.layouts[static_cast<size_t>(kind)] = output;
+    climb_one(map, parameters, std::string("to ") + layout_name(kind), order, &points);
   }
   return points;
 }
