@@ -28,16 +28,18 @@ std::span<const std::byte> blob_bytes(const InputRef& ref, const Inputs& inputs)
 
 DecodedImage decode_environment(const InputRef& ref, const Inputs& inputs) {
   if (ref.faces.empty()) return decode_light_image(blob_bytes(ref, inputs));
-  std::array<DecodedImage, 6> faces;
-  for (size_t i = 0; i < faces.size(); ++i) {
+  CubeOfFaces cube;
+  for (size_t i = 0; i < kCubeFaceNames.size(); ++i) {
+    DecodedImage face;
     try {
-      faces[i] = decode_light_image(blob_of(ref.faces.at(i), inputs));
+      face = decode_light_image(blob_of(ref.faces.at(i), inputs));
     } catch (const Error& error) {
       throw Error(error.code(), std::string("The face ") + kCubeFaceNames[i] + ": " + error.what(),
                   error.where());
     }
+    cube.add(std::move(face));
   }
-  return join_faces(std::move(faces));
+  return cube.take();
 }
 
 SourceReading environment_reading(const InputRef& ref, const SourceParameters& parameters) {

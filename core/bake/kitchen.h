@@ -13,7 +13,7 @@ namespace lightkiln {
 // Inputs as bytes, looked up by the spec's digests. Throws Error{not_found} for a missing blob.
 GltfSource gltf_source(const InputRef& ref, const Inputs& inputs);
 std::span<const std::byte> blob_bytes(const InputRef& ref, const Inputs& inputs);
-// Decodes the environment's file or its six, see decode_light_image() and join_faces(), whose
+// Decodes the environment's file or its six, see decode_light_image() and CubeOfFaces, whose
 // errors it throws, with the face's name where it is one of six.
 DecodedImage decode_environment(const InputRef& ref, const Inputs& inputs);
 // How it is to be read: six files are a cube_strip.

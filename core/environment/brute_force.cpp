@@ -104,13 +104,12 @@ LIGHTKILN_CLONES Vec3d weighted_sum(const Row& row, std::span<const double> weig
 }  // namespace brute_force
 
 // A texel is a box: along its row cos(m phi) integrates to (2/m) sin(m s/2) cos(m phi_centre), and
-// across it Gauss points of P_lm sin(theta), eight a row, are exact to the last digit as long as a
-// row spans less than a radian of the band. The standard library's Y_lm(theta, 0) carries the
-// Condon-Shortley phase, which is taken off.
+// across it Gauss points of P_lm sin(theta) are exact to the last digit when there are eight, and
+// as many more as radians of the band that a row spans. The standard library's Y_lm(theta, 0)
+// carries the Condon-Shortley phase, which is taken off.
 Vec3d projected_coefficient(const Environment& environment, int l, int m) {
-  constexpr int kPoints = 8;
-  static const GaussRule rule = gauss_legendre(kPoints);
   const Image& map = environment.radiance;
+  const GaussRule rule = gauss_legendre(8 + static_cast<int>((l + 1) * kPi / map.height));
   const int order = std::abs(m);
   const double step = 2 * kPi / map.width, row_step = kPi / map.height;
   const double box = order > 0 ? 2 * std::sin(order * step / 2) / order : step;
@@ -123,7 +122,7 @@ Vec3d projected_coefficient(const Environment& environment, int l, int m) {
   Vec3d sum;
   for (int y = 0; y < map.height; ++y) {
     double height = 0;
-    for (size_t k = 0; k < kPoints; ++k) {
+    for (size_t k = 0; k < rule.nodes.size(); ++k) {
       const double theta = (y + 0.5 + 0.5 * rule.nodes[k]) * row_step;
       height += 0.5 * row_step * rule.weights[k] * std::sin(theta) *
                 std::sph_legendre(static_cast<unsigned>(l), static_cast<unsigned>(order), theta);

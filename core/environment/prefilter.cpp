@@ -12,10 +12,11 @@
 
 namespace lightkiln {
 
-// By Parseval a level's rms error is the root of sum_l (h_l b_l)^2, b_l the error of a band.
+// By Parseval a level's rms error is the root of sum_l (h_l b_l)^2, b_l the error of a band. The
+// error of n points falls faster than any power once n is above half the highest band's phase over
+// a row, so that some number is enough; on maps of few rows it is large, and so are the steps.
 int row_points(int height, std::span<const LobePlan> lobes, const ShNeed& sh) {
-  constexpr int kMostPoints = 16;
-  for (int points = 1; points < kMostPoints; ++points) {
+  for (int points = 1;; points += 1 + points / 8) {
     bool enough = sh.bands == 0 || row_band_error(points, sh.bands - 1, height) <= sh.error;
     for (size_t i = 0; i < lobes.size() && enough; ++i) {
       double squares = 0;
@@ -27,7 +28,6 @@ int row_points(int height, std::span<const LobePlan> lobes, const ShNeed& sh) {
     }
     if (enough) return points;
   }
-  return kMostPoints;
 }
 
 LatlongSpectrum project_for(const Environment& environment, std::span<const LobePlan> lobes,

@@ -44,11 +44,15 @@ int exr_library_threads(int threads) {
   const int wanted = granted_threads(threads);
   if (wanted == 1) return 0;  // the library then starts nothing and hands nothing over
   static std::mutex mutex;
+  static bool exhausted = false;
   const std::lock_guard lock(mutex);
+  // One at a time: where a thread fails to start among others, version 3.1.5 lets those that did
+  // start go on beside an object that it has freed.
   try {
-    if (Imf::globalThreadCount() < wanted) Imf::setGlobalThreadCount(wanted);
+    while (!exhausted && Imf::globalThreadCount() < wanted)
+      Imf::setGlobalThreadCount(Imf::globalThreadCount() + 1);
   } catch (const std::system_error&) {
-    // The system has no more threads to give. Those that started do the work.
+    exhausted = true;  // the system has no more threads to give: those that started do the work
   }
   return std::min(wanted, Imf::globalThreadCount());
 }

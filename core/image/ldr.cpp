@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <new>
+#include <string_view>
 
 #include "core/base/error.h"
 #include "core/image/ldr_check.h"
@@ -113,7 +115,9 @@ Decoded<T> decode(const LdrSource& source, int channels,
   Decoded<T> pixels(load(source.data, source.size, &width, &height, &stored, channels), std::free);
   if (!pixels && g_asked_for_more)
     malformed(source.format, "it unpacks to more than its size allows");
-  if (!pixels) malformed(source.format, stbi_failure_reason());
+  const char* reason = pixels ? "" : stbi_failure_reason();
+  if (!pixels && std::string_view(reason) == "outofmem") throw std::bad_alloc();
+  if (!pixels) malformed(source.format, reason);
   return pixels;
 }
 

@@ -168,8 +168,27 @@ TEST(EnvironmentInputs, AFaceThatDoesNotFitIsNamed) {
   order.give(3, write_png(grey_picture(8, 4, 10)));
   EXPECT_REFUSED(Bake(order.spec, order.inputs, {1, 0, 1}), invalid_input,
                  "The face ny is 8 x 4 pixels");
+  order.give(0, write_png(grey_picture(8, 4, 10)));
+  EXPECT_REFUSED(Bake(order.spec, order.inputs, {1, 0, 1}), invalid_input,
+                 "The face px is 8 x 4 pixels; the six faces");
+  order.give(0, write_png(grey_picture(2731, 2731, 10)));
+  EXPECT_REFUSED(Bake(order.spec, order.inputs, {1, 0, 1}), too_large, "at most 2730 texels");
+  order.give(0, face_file(0, kSide, cube_direction));
   order.give(3, std::vector<std::byte>(100));
   EXPECT_REFUSED(Bake(order.spec, order.inputs, {1, 0, 1}), invalid_input, "The face ny: ");
+}
+
+TEST(EnvironmentInputs, OnlyACubeOfPicturesIsCalledOne) {
+  SixFiles order(cube_direction);
+  const auto warnings = [&] {
+    Progress progress;
+    return Bake(order.spec, order.inputs, {1, 0, 1}).plan(progress).warnings.size();
+  };
+  for (int face = 0; face < 6; ++face) {
+    EXPECT_EQ(warnings(), 0u) << face;
+    order.give(face, write_png(grey_picture(kSide, kSide, static_cast<uint8_t>(90 + face))));
+  }
+  EXPECT_EQ(warnings(), 1u);
 }
 
 TEST(EnvironmentInputs, FacesAndOneFileAreNotMixed) {

@@ -83,6 +83,18 @@ TEST(BruteForce, ProjectsOneCoefficientAtATime) {
   }
 }
 
+// A row of a small map spans many radians of a high band.
+TEST(BruteForce, ProjectsHighBandsOfSmallMaps) {
+  const Environment sky = sky_of(4, 100);
+  Progress progress;
+  const LatlongSpectrum spectrum = project_latlong(sky.radiance, 129, 400, 1, progress);
+  for (const auto& [l, m] : {std::pair{60, 3}, {128, 0}, {128, 64}, {100, 1}}) {
+    const double* at = &spectrum.coefficients[spectrum.offset(l, m)];
+    const Vec3d truth = projected_coefficient(sky, l, m);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(at[c], truth[c], 1e-9 * spectrum.coefficients[0]);
+  }
+}
+
 TEST(BruteForce, AveragesATexelOfACube) {
   const Environment sky = sky_of(32, 10);
   // A side, a corner of the pole face, the pole inside a texel and on its corner.

@@ -129,6 +129,48 @@ Difference against_brute_force(const Environment& environment, const Level& leve
   return difference;
 }
 
+// The rms over the sphere, relative to the mean, by which two projections make a lobe's level
+// differ.
+double level_difference(const LatlongSpectrum& a, const LatlongSpectrum& b,
+                        std::span<const double> responses) {
+  double squares = 0;
+  for (int l = 1; l < static_cast<int>(responses.size()); ++l) {
+    const double response = responses[static_cast<size_t>(l)];
+    for (int m = 0; m <= l; ++m) {
+      for (size_t part = 0; part < (m > 0 ? 2u : 1u); ++part) {
+        const size_t at = a.offset(l, m) + 3 * part + 1;
+        const double off = (a.coefficients[at] - b.coefficients[at]) * response;
+        squares += off * off;
+      }
+    }
+  }
+  return std::sqrt(squares) / a.coefficients[a.offset(0, 0) + 1];
+}
+
+// Over the few tall rows of a small map the harmonics of a narrow lobe turn many times: the rows'
+// quadrature must grow with them.
+TEST(Prefilter, SumsTheRowsOfSmallMapsToo) {
+  Progress progress;
+  for (const int height : {1, 2, 4, 8, 16, 32, 64}) {
+    const Environment environment = environment_of(reference::test_sky(height, 300));
+    const LightStatistics light = measure_light(environment);
+    for (const Lobe& lobe : {Lobe{LobeKind::ggx, 0.01}, Lobe{LobeKind::ggx, 0.04},
+                             Lobe{LobeKind::charlie, 0.0049}, Lobe{LobeKind::charlie, 0.04}}) {
+      const LobePlan plan = plan_lobe(light, lobe, 1e-4);
+      const LatlongSpectrum made = project_for(environment, {&plan, 1}, {}, 1, progress);
+      const LatlongSpectrum truth =
+          project_latlong(environment.radiance, made.bands, 5000 / height, 1, progress);
+      EXPECT_LE(level_difference(made, truth, plan.responses), plan.row_error + 1e-12)
+          << height << " " << lobe.alpha;
+      if (height > 4) continue;
+      // Positive control: sixteen points, which are plenty for a map of ordinary height.
+      const LatlongSpectrum few =
+          project_latlong(environment.radiance, made.bands, 16, 1, progress);
+      EXPECT_GT(level_difference(few, truth, plan.responses), plan.row_error) << height;
+    }
+  }
+}
+
 // The texels whose directions lie nearest to the map's brightest texel, where what the band limits
 // cut off is largest.
 TEST(Prefilter, EqualsBruteForceAroundTheSun) {
