@@ -3,7 +3,6 @@
 #include "core/bake/maps_layouts.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "core/bake/maps_cost.h"
@@ -52,8 +51,6 @@ std::string describe(const MapLayout& layout) {
   }
   return "";
 }
-
-constexpr std::array<const char*, 6> kFaceNames = {"px", "nx", "py", "ny", "pz", "nz"};
 
 // Beyond this an order is coarse enough to be met by what costs least.
 constexpr double kCoarsest = 0.05;
@@ -133,10 +130,10 @@ class LayoutImage : public MapsOutput {
     const std::string stem = "layout_" + entry.name;
     if (product_ == kCubeFaces) {
       for (int face = 0; face < 6; ++face) {
-        const std::string name = stem + "_" + kFaceNames[static_cast<size_t>(face)] + ".exr";
+        const std::string name = stem + "_" + kCubeFaceNames[static_cast<size_t>(face)] + ".exr";
         Image part(layout_.width, layout_.width, 3);
         std::copy_n(image.at(0, face * layout_.width), part.pixels.size(), part.pixels.begin());
-        write(part, name, describe(layout_) + "; this file: face " + kFaceNames[size_t(face)],
+        write(part, name, describe(layout_) + "; this file: face " + kCubeFaceNames[size_t(face)],
               EnvmapAttribute::none, result);
         entry.artifacts.push_back(name);
       }

@@ -17,8 +17,4 @@ Image resample_to_cube(const Image& latlong, int face_size, int threads, Progres
 // What is left of a texel, relative to itself: half a step of float. No order makes it cheaper.
 inline constexpr double kResampleRounding = 6e-8;
 
-// What conversions that are no such integrals leave, as measured against a sum of points: rms over
-// texels of the relative error.
-inline constexpr double kResampleError = 1e-3;
-
 }  // namespace lightkiln

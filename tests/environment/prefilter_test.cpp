@@ -13,33 +13,21 @@
 #include "core/sphere/direction_map.h"
 #include "core/sphere/quadrature.h"
 #include "core/sphere/solid_angle.h"
+#include "tests/environment/convolved.h"
 #include "tests/reference/sphere_twins.h"
 #include "tests/support/data.h"
 
 namespace lightkiln {
 namespace {
 
-Environment environment_of(const Image& image) {
-  DecodedImage decoded;
-  decoded.image = image;
-  return make_environment(decoded);
-}
+using test::environment_of;
+using test::Level;
 
-struct Level {
-  LobePlan lobe;
-  Image cube;
-  RangeReport range;
-};
 Level prefilter(const Environment& environment, double alpha, int size, double target,
                 bool correct = true) {
-  Progress progress;
-  const LightStatistics light = measure_light(environment);
-  Level level{plan_lobe(light, {LobeKind::ggx, alpha}, target), {}, {}};
-  if (!correct) level.lobe.corrected = false;
-  const LatlongSpectrum spectrum = project_for(environment, {&level.lobe, 1}, 1, 2, progress);
-  level.cube =
-      convolve_lobe(environment, light, spectrum, level.lobe, size, 2, progress, &level.range);
-  return level;
+  LobePlan plan = plan_lobe(measure_light(environment), {LobeKind::ggx, alpha}, target);
+  if (!correct) plan.corrected = false;
+  return test::convolve(environment, plan, size);
 }
 
 TEST(GgxLobe, IsTheCosineAtFullRoughness) {
@@ -117,7 +105,7 @@ Difference against_brute_force(const Environment& environment, const Level& leve
     const int texel = (i * 7919 + 13) % (6 * size * size);
     const int x = texel % size, y = texel / size;
     const Vec3d d = cube_texel_direction(y / size, x, y % size, size);
-    const Vec3d truth = reference::prefilter(environment.radiance, level.lobe.lobe.alpha, d);
+    const Vec3d truth = reference::prefilter(environment.radiance, level.plan.lobe.alpha, d);
     const Vec3d error = to_double(level.cube.rgb(x, y)) - truth;
     difference.rms += dot(error, error) / 3;
     for (int c = 0; c < 3; ++c) {
@@ -210,7 +198,7 @@ TEST(Prefilter, EqualsBruteForceUnderASun) {
   for (const double alpha : {0.0625, 0.25, 0.5625, 1.0}) {
     const Level level = prefilter(environment, alpha, 32, 1e-4);
     const Difference difference = against_brute_force(environment, level, 32, 40);
-    EXPECT_LE(level.lobe.error_bound, 1e-4) << alpha;
+    EXPECT_LE(level.plan.error_bound, 1e-4) << alpha;
     EXPECT_LT(difference.rms, 1e-4) << alpha;
     EXPECT_LT(difference.worst_relative, 1e-3) << alpha;
     EXPECT_LT(level.range.most, 1e-3) << alpha;
@@ -222,7 +210,7 @@ TEST(Prefilter, EqualsBruteForceUnderASun) {
 TEST(Prefilter, WouldRingUnderASunWithoutTheCorrection) {
   const Environment environment = environment_of(reference::test_sky(128, 1e5));
   const Level level = prefilter(environment, 0.25, 32, 1e-4, false);
-  EXPECT_GT(level.lobe.uncorrected_bound, 1e-3);
+  EXPECT_GT(level.plan.uncorrected_bound, 1e-3);
   EXPECT_GT(against_brute_force(environment, level, 32, 40).rms, 1e-3);
 }
 
