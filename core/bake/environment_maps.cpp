@@ -2,6 +2,7 @@
 // bytes are its outputs' values in order, then what was measured of the error of each.
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <mutex>
 
@@ -181,7 +182,8 @@ double model_seconds(MapsLight& light, const MapsOutputs& outputs, int check_tex
   if (bands > 0) {
     const double row = bands <= direct_row_orders(map.width)
                            ? kDirectPerTexel + kDirectPerOrder * bands
-                           : kFourierPerPoint * std::log2(width + 1);
+                           : kFourierPerPoint * std::log2(width + 1) *
+                                 (std::has_single_bit(unsigned(map.width)) ? 1 : kOddFourier);
     const int points = row_points(map.height, lobes_of(outputs), sh_need_of(outputs));
     seconds += row * width * height + kLegendrePerTerm * points * height * bands * bands;
   }

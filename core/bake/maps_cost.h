@@ -5,16 +5,18 @@
 
 namespace lightkiln {
 
-inline constexpr double kDecodePerTexel = 4e-9;     // statistics; decoding is the input's own time
-inline constexpr double kFourierPerPoint = 2.7e-9;  // times log2 of the width
-inline constexpr double kDirectPerTexel = 1.1e-9;   // of rows summed directly, and an order more:
-inline constexpr double kDirectPerOrder = 8e-10;
-inline constexpr double kLegendrePerTerm = 1.7e-10;  // and point in a row
-inline constexpr double kRingPerTerm = 7e-9;         // bands^3
-inline constexpr double kPerTexel = 4e-8;            // interpolation
+inline constexpr double kDecodePerTexel = 4e-9;      // statistics; decoding is the input's own time
+inline constexpr double kFourierPerPoint = 4.4e-10;  // times log2 of the width, a power of two
+inline constexpr double kOddFourier = 11;            // times as much for other widths
+inline constexpr double kDirectPerTexel = 9e-10;     // of rows summed directly, and an order more:
+inline constexpr double kDirectPerOrder = 1.45e-10;
+inline constexpr double kLegendrePerTerm = 1e-10;  // and point in a row
+inline constexpr double kRingPerTerm = 6.6e-10;    // bands^3
+inline constexpr double kRingPerPoint = 7.5e-9;    // of the grid of rings
+inline constexpr double kPerTexel = 4e-8;          // interpolation
 inline constexpr double kPerBrightPoint = 3e-9;
 inline constexpr double kPerCorePoint = 4e-9;
-inline constexpr double kResamplePerCell = 1.5e-8;
+inline constexpr double kResamplePerCell = 1.3e-8;
 // Another layout: by what convert_layout() counts.
 inline constexpr double kConvertPerPlace = 4.5e-8;
 inline constexpr double kConvertPerPolygon = 8e-8;

@@ -41,7 +41,9 @@ double ConvolvedCube::model_seconds(MapsLight& light) const {
   const double texels = 6.0 * size_ * size_;
   if (!lobe_) return kResamplePerCell * (map.width + 4.0 * size_) * (map.height + 2.0 * size_);
   const double cut = plan_.bands;
-  double seconds = kRingPerTerm * cut * cut * cut + kPerTexel * texels;
+  const double points =
+      double(convolution_rings(plan_.bands)) * convolution_longitudes(plan_.bands);
+  double seconds = kRingPerTerm * cut * cut * cut + kRingPerPoint * points + kPerTexel * texels;
   if (plan_.corrected) {
     seconds += kPerBrightPoint * texels *
                cut_light_points(light.statistics(), plan_.bands, plan_.cell_phase);

@@ -39,9 +39,11 @@ constexpr std::array<SideFace, 4> kSides = {{{0, 0.25}, {1, 0.75}, {4, 0.5}, {5,
 struct Grid {
   const Image& map;
   int size;
+  CubeSolidAngles solid_angles;
   std::vector<double> y, tangent;  // of the latitude of each row's upper border, height + 1
 
-  Grid(const Image& latlong, int face_size) : map(latlong), size(face_size) {
+  Grid(const Image& latlong, int face_size)
+      : map(latlong), size(face_size), solid_angles(face_size) {
     const int height = map.height;
     for (int row = 0; row <= height; ++row) {
       const int nearer = std::min(row, height - row);
@@ -204,46 +206,55 @@ void write(const Vec3d& energy, double omega, float* out) {
   for (int c = 0; c < 3; ++c) out[c] = static_cast<float>(std::max(0.0, energy[c] / omega));
 }
 
-// Texel columns [begin, end) of the four side faces. Line j is tan(latitude) = (1 - 2j/size) cos b.
-void fill_side_columns(const Grid& grid, int begin, int end, Image* cube) {
-  const int size = grid.size;
+// Texel columns of a side face whose lines are walked in one go: they lie before their summit, at
+// longitude 0, or after it. An odd face has a texel on both sides of it.
+struct Stretch {
+  Place from;
+  std::vector<Place> ends;
+  int first;  // texel column that ends[0] ends
+};
+
+std::vector<Stretch> side_stretches(int begin, int end, int size) {
   const auto edge = [&](int i) {
     const double s = 2.0 * i / size - 1;
     return Place{std::atan(s), s / std::sqrt(1 + s * s)};
   };
+  std::vector<Stretch> stretches;
+  Stretch before{edge(begin), {}, begin}, after{{0, 0}, {}, std::max(begin, size / 2)};
+  if (2 * begin >= size) after.from = edge(begin);
+  for (int i = begin; i < end; ++i) {
+    if (2 * i < size) before.ends.push_back(2 * i + 1 == size ? Place{0, 0} : edge(i + 1));
+    if (2 * (i + 1) > size) after.ends.push_back(edge(i + 1));
+  }
+  if (!before.ends.empty()) stretches.push_back(std::move(before));
+  if (!after.ends.empty()) stretches.push_back(std::move(after));
+  return stretches;
+}
+
+// Texel columns [begin, end) of the four side faces. Line j is tan(latitude) = (1 - 2j/size) cos b.
+void fill_side_columns(const Grid& grid, int begin, int end, Image* cube) {
+  const int size = grid.size;
   std::vector<Vec3d> above(static_cast<size_t>(end - begin)), below = above;
   const int first_row = std::max(0, grid.row_of(1) - 1);
   const int last_row = grid.map.height - 1 - first_row;
-  std::vector<Place> ends;
+  const std::vector<Stretch> stretches = side_stretches(begin, end, size);
+  const double west = stretches.front().from.longitude;
+  const double east = stretches.back().ends.back().longitude;
   for (const SideFace& side : kSides) {
-    const Borders borders(side, grid.map.width, edge(begin).longitude, edge(end).longitude);
+    const Borders borders(side, grid.map.width, west, east);
     const ColumnSums sums(grid, borders.first(), borders.last(), first_row, last_row, false);
     for (int j = 0; j <= size; ++j) {
       const Line line{1 - 2.0 * j / size, 0};
       std::fill(below.begin(), below.end(), Vec3d{});
-      for (int i = begin; i < end;) {
-        // Up to the summit, or from it on; an odd face has a texel on both sides of it.
-        const bool before = 2 * i < size;
-        ends.clear();
-        int last = i;
-        for (; last < end && (before ? 2 * last < size : true); ++last) {
-          ends.push_back(2 * last + 1 == size && before ? Place{0, 0} : edge(last + 1));
-        }
-        const auto add = [&](size_t n, const Vec3d& integral) {
-          below[static_cast<size_t>(i - begin) + n] += integral;
-        };
-        walk(grid, sums, borders, line, edge(i), ends, add);
-        if (2 * last - 1 == size && before) {
-          const std::array<Place, 1> rest{edge(last)};
-          const size_t middle = static_cast<size_t>(last - 1 - begin);
-          walk(grid, sums, borders, line, {0, 0}, rest,
-               [&](size_t, const Vec3d& integral) { below[middle] += integral; });
-        }
-        i = last;
+      for (const Stretch& stretch : stretches) {
+        walk(grid, sums, borders, line, stretch.from, stretch.ends,
+             [&](size_t n, const Vec3d& integral) {
+               below[static_cast<size_t>(stretch.first - begin) + n] += integral;
+             });
       }
       for (int i = begin; i < end && j > 0; ++i) {
         const size_t n = static_cast<size_t>(i - begin);
-        write(below[n] - above[n], cube_texel_solid_angle(i, j - 1, size),
+        write(below[n] - above[n], grid.solid_angles.at(i, j - 1),
               cube->at(i, side.face * size + j - 1));
       }
       above.swap(below);
@@ -353,8 +364,7 @@ void fill_pole(const Grid& grid, bool north, Image* cube, Progress& progress) {
     for (int s = 0; s < size; ++s) {
       const size_t cell =
           static_cast<size_t>(t) * static_cast<size_t>(size) + static_cast<size_t>(s);
-      write(cells[cell], cube_texel_solid_angle(s, t, size),
-            cube->at(s, (north ? 2 : 3) * size + t));
+      write(cells[cell], grid.solid_angles.at(s, t), cube->at(s, (north ? 2 : 3) * size + t));
     }
   }
 }

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/instruction_sets.h"
 #include "core/base/math.h"
 
 namespace lightkiln {
@@ -27,6 +28,42 @@ Complex4 times(const Complex4& a, double re, double im) {
 
 void swap_parts(Complex4* data, int count) {
   for (int i = 0; i < count; ++i) std::swap(data[i].re, data[i].im);
+}
+
+// Each pass of length n and stride s combines four runs n/4 apart and writes them in order, so that
+// no bit reversal is needed; a last pass of radix 2 completes odd powers.
+LIGHTKILN_CLONES void run_passes(Complex4* data, Complex4* work, int length, const double* cosine,
+                                 const double* sine) {
+  Complex4 *x = data, *y = work;
+  int n = length, s = 1;
+  for (; n >= 4; n /= 4, s *= 4) {
+    const int m = n / 4;
+    for (int p = 0; p < m; ++p) {
+      const size_t w1 = static_cast<size_t>(p) * static_cast<size_t>(s), w2 = 2 * w1, w3 = 3 * w1;
+      for (int q = 0; q < s; ++q) {
+        const Complex4 a = x[q + s * p], b = x[q + s * (p + m)];
+        const Complex4 c = x[q + s * (p + 2 * m)], d = x[q + s * (p + 3 * m)];
+        const Complex4 ac = a + c, a_c = a - c, bd = b + d;
+        const Complex4 jbd{d.im - b.im, b.re - d.re};  // i (b - d)
+        y[q + s * (4 * p)] = ac + bd;
+        y[q + s * (4 * p + 1)] = times(a_c - jbd, cosine[w1], -sine[w1]);
+        y[q + s * (4 * p + 2)] = times(ac - bd, cosine[w2], -sine[w2]);
+        y[q + s * (4 * p + 3)] = times(a_c + jbd, cosine[w3], -sine[w3]);
+      }
+    }
+    std::swap(x, y);
+  }
+  if (n == 2) {
+    for (int q = 0; q < s; ++q) {
+      const Complex4 a = x[q], b = x[q + s];
+      y[q] = a + b;
+      y[q + s] = a - b;
+    }
+    std::swap(x, y);
+  }
+  if (x != data) {
+    for (int i = 0; i < length; ++i) data[i] = x[i];
+  }
 }
 
 }  // namespace
@@ -59,39 +96,8 @@ Fourier::Fourier(int length) : length_(length), padded_(length) {
   }
 }
 
-// Each pass of length n and stride s combines four runs n/4 apart and writes them in order, so that
-// no bit reversal is needed; a last pass of radix 2 completes odd powers.
 void Fourier::power_of_two(Complex4* data, Complex4* work) const {
-  Complex4 *x = data, *y = work;
-  int n = padded_, s = 1;
-  for (; n >= 4; n /= 4, s *= 4) {
-    const int m = n / 4;
-    for (int p = 0; p < m; ++p) {
-      const size_t w1 = static_cast<size_t>(p) * static_cast<size_t>(s), w2 = 2 * w1, w3 = 3 * w1;
-      for (int q = 0; q < s; ++q) {
-        const Complex4 a = x[q + s * p], b = x[q + s * (p + m)];
-        const Complex4 c = x[q + s * (p + 2 * m)], d = x[q + s * (p + 3 * m)];
-        const Complex4 ac = a + c, a_c = a - c, bd = b + d;
-        const Complex4 jbd{d.im - b.im, b.re - d.re};  // i (b - d)
-        y[q + s * (4 * p)] = ac + bd;
-        y[q + s * (4 * p + 1)] = times(a_c - jbd, cosine_[w1], -sine_[w1]);
-        y[q + s * (4 * p + 2)] = times(ac - bd, cosine_[w2], -sine_[w2]);
-        y[q + s * (4 * p + 3)] = times(a_c + jbd, cosine_[w3], -sine_[w3]);
-      }
-    }
-    std::swap(x, y);
-  }
-  if (n == 2) {
-    for (int q = 0; q < s; ++q) {
-      const Complex4 a = x[q], b = x[q + s];
-      y[q] = a + b;
-      y[q + s] = a - b;
-    }
-    std::swap(x, y);
-  }
-  if (x != data) {
-    for (int i = 0; i < padded_; ++i) data[i] = x[i];
-  }
+  run_passes(data, work, padded_, cosine_.data(), sine_.data());
 }
 
 void Fourier::forward(Complex4* data, std::vector<Complex4>& work) const {

@@ -5,13 +5,11 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/base/lanes.h"
+
 namespace lightkiln {
 
-// Four doubles, one of each signal: arithmetic is per lane and gives the same bits with any vector
-// width the compiler chooses.
-typedef double Lanes __attribute__((vector_size(32)));
-inline constexpr int kLanes = 4;
-
+// Four complex numbers, one of each signal.
 struct Complex4 {
   Lanes re, im;
 };

@@ -8,6 +8,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "core/base/instruction_sets.h"
 #include "core/base/parallel.h"
 #include "core/sphere/harmonic_rotation.h"
 #include "core/sphere/legendre.h"
@@ -33,9 +34,9 @@ BlockNodes block_nodes(int block, int height, const GaussRule& rule) {
       const int row = std::min(block * kRowPairs + i, (height + 1) / 2 - 1);
       const double theta = step * (row + 0.5 + 0.5 * rule.nodes[point]);
       const size_t slot = point * kRowVectors + static_cast<size_t>(i / kLanes);
-      nodes.cosine[slot][i % kLanes] = std::cos(theta);
-      nodes.sine[slot][i % kLanes] = std::sin(theta);
-      nodes.weight[slot][i % kLanes] = 0.5 * step * rule.weights[point] * std::sin(theta);
+      nodes.cosine[slot].set(i % kLanes, std::cos(theta));
+      nodes.sine[slot].set(i % kLanes, std::sin(theta));
+      nodes.weight[slot].set(i % kLanes, 0.5 * step * rule.weights[point] * std::sin(theta));
       nodes.farthest = std::max(nodes.farthest, std::min(theta, kPi - theta));
     }
   }
@@ -44,8 +45,9 @@ BlockNodes block_nodes(int block, int height, const GaussRule& rule) {
 
 // All coefficients of order m: for each block of rows, the Legendre values of every band summed
 // over the row's points meet the six sums or differences.
-void project_order(int m, const RowSpectra& spectra, const std::vector<BlockNodes>& nodes,
-                   const LegendreStart& start, LatlongSpectrum* spectrum) {
+LIGHTKILN_CLONES void project_order(int m, const RowSpectra& spectra,
+                                    const std::vector<BlockNodes>& nodes,
+                                    const LegendreStart& start, LatlongSpectrum* spectrum) {
   const int bands = spectrum->bands;
   const LegendreStep step(m, bands);
   std::vector<Lanes> sums(static_cast<size_t>(bands - m) * 6, Lanes{});
@@ -58,7 +60,7 @@ void project_order(int m, const RowSpectra& spectra, const std::vector<BlockNode
     before.assign(count, Lanes{});
     for (size_t i = 0; i < count; ++i) {
       for (int lane = 0; lane < kLanes; ++lane) {
-        value[i][lane] = at.weight[i][lane] * start(m, at.sine[i][lane]);
+        value[i].set(lane, at.weight[i][lane] * start(m, at.sine[i][lane]));
       }
     }
     const Lanes* rows = spectra.at(m, block);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 
+#include "core/base/instruction_sets.h"
 #include "core/base/parallel.h"
 #include "core/sphere/fourier.h"
 #include "core/sphere/harmonic_transform.h"
@@ -127,8 +128,8 @@ struct RingPairs {
 };
 
 // Sums over l of one order for kLanes ring pairs: even and odd l+m apart, six values each.
-void sum_order(const double* c, const LegendreStep& step, const Lanes& cosine, const Lanes& start,
-               int count, Lanes even[6], Lanes odd[6]) {
+LIGHTKILN_CLONES void sum_order(const double* c, const LegendreStep& step, const Lanes& cosine,
+                                const Lanes& start, int count, Lanes even[6], Lanes odd[6]) {
   Lanes before{}, value = start;
   for (int i = 0; i < count; ++i, c += 6) {
     if (i > 0) {
@@ -188,8 +189,8 @@ RingGrid synthesise_rings(const LatlongSpectrum& spectrum, std::span<const doubl
           const int first = static_cast<int>(block) * kLanes;
           for (int lane = 0; lane < kLanes; ++lane) {
             const double theta = kPi * (std::min(first + lane, pairs - 1) + 0.5) / rings;
-            at.cosine[lane] = std::cos(theta);
-            at.sine[lane] = std::sin(theta);
+            at.cosine.set(lane, std::cos(theta));
+            at.sine.set(lane, std::sin(theta));
             at.farthest = std::max(at.farthest, theta);
           }
           for (auto& signal : signals) {
@@ -197,7 +198,7 @@ RingGrid synthesise_rings(const LatlongSpectrum& spectrum, std::span<const doubl
           }
           for (int m = 0; m < bands && !legendre_negligible(m, at.farthest, bands); ++m) {
             Lanes value{}, even[6] = {}, odd[6] = {};
-            for (int lane = 0; lane < kLanes; ++lane) value[lane] = start(m, at.sine[lane]);
+            for (int lane = 0; lane < kLanes; ++lane) value.set(lane, start(m, at.sine[lane]));
             sum_order(&scaled.coefficients[scaled.offset(m, m)], steps[static_cast<size_t>(m)],
                       at.cosine, value, bands - m, even, odd);
             place_order(m, even, odd, longitudes, signals);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/base/instruction_sets.h"
 #include "core/base/math.h"
 #include "core/base/parallel.h"
 
@@ -37,8 +38,8 @@ void transform_row_pairs(const Image& image, int vector_index, const Fourier& fo
       const bool used = north < pairs;
       for (int k = 0; k < width; ++k) {
         Complex4& z = signal[static_cast<size_t>(k)];
-        z.re[lane] = used ? double(image.at(k, north)[channel]) : 0.0;
-        z.im[lane] = used && south > north ? double(image.at(k, south)[channel]) : 0.0;
+        z.re.set(lane, used ? double(image.at(k, north)[channel]) : 0.0);
+        z.im.set(lane, used && south > north ? double(image.at(k, south)[channel]) : 0.0);
       }
     }
     fourier.forward(signal.data(), work);
@@ -83,7 +84,7 @@ void load_texel(const float* p, Lanes* texel) {
   typedef float Floats __attribute__((vector_size(16)));
   Floats values;
   std::memcpy(&values, p, sizeof values);
-  *texel = __builtin_convertvector(values, Lanes);
+  texel->values = __builtin_convertvector(values, Lanes::Vector);
 }
 
 // Cosine and sine integrals of one row, R G B in the lanes: [2 m] and [2 m + 1].
@@ -92,7 +93,8 @@ void load_texel(const float* p, Lanes* texel) {
 // d
 //   cos: cos(m phi) ((a + b) + s (c + d)),  sin: sin(m phi) ((a - b) - s (c - d)),  s = (-1)^m,
 // so that a quarter of the products is left, on four folded signals. Tiles keep those in the cache.
-void sum_row(const float* row, int width, const QuarterTable& table, std::vector<Lanes>& sums) {
+LIGHTKILN_CLONES void sum_row(const float* row, int width, const QuarterTable& table,
+                              std::vector<Lanes>& sums) {
   constexpr int kTile = 64;
   std::array<Lanes, kTile> folded[4];  // cosine even, cosine odd, sine even, sine odd m
   std::fill(sums.begin(), sums.end(), Lanes{});
@@ -158,8 +160,8 @@ void sum_row_pairs(const Image& image, int vector_index, const QuarterTable& tab
         const Lanes& n = north_sums[static_cast<size_t>(2 * m + part)];
         const Lanes& s = south_sums[static_cast<size_t>(2 * m + part)];
         for (int channel = 0; channel < 3; ++channel) {
-          out[(3 * part + channel) * kRowVectors][lane] = n[channel] + s[channel];
-          out[(6 + 3 * part + channel) * kRowVectors][lane] = n[channel] - s[channel];
+          out[(3 * part + channel) * kRowVectors].set(lane, n[channel] + s[channel]);
+          out[(6 + 3 * part + channel) * kRowVectors].set(lane, n[channel] - s[channel]);
         }
       }
     }
@@ -168,11 +170,11 @@ void sum_row_pairs(const Image& image, int vector_index, const QuarterTable& tab
 
 }  // namespace
 
-// Measured at width 2048; widths that are not powers of two transform as a convolution of four
-// times the length.
+// Measured at widths 2048 and 1440; widths that are not powers of two transform as a convolution of
+// four times the length.
 int direct_row_orders(int width) {
   if (width % 4 != 0) return 0;
-  return std::has_single_bit(static_cast<unsigned>(width)) ? 32 : 96;
+  return std::has_single_bit(static_cast<unsigned>(width)) ? 26 : 320;
 }
 
 RowSpectra row_spectra(const Image& image, int orders, int threads, Progress& progress,

@@ -28,6 +28,26 @@ double cube_texel_solid_angle(int x, int y, int size) {
                            2.0 * (y + 1) / size - 1);
 }
 
+// The four terms of each texel stand at corners that its neighbours share.
+CubeSolidAngles::CubeSolidAngles(int size) : size_(size) {
+  const int half = (size + 1) / 2;
+  const auto line = [&](int y) {
+    std::vector<double> corners;
+    for (int x = 0; x <= half; ++x) {
+      corners.push_back(corner_solid_angle(2.0 * x / size - 1, 2.0 * y / size - 1));
+    }
+    return corners;
+  };
+  std::vector<double> above = line(0);
+  for (int y = 0; y < half; ++y) {
+    std::vector<double> below = line(y + 1);
+    for (size_t x = 0; x < static_cast<size_t>(half); ++x) {
+      texels_.push_back(below[x + 1] - below[x] - above[x + 1] + above[x]);
+    }
+    above.swap(below);
+  }
+}
+
 // Exact: the row spans colatitudes [t0, t1], and cos t0 - cos t1 = 2 sin((t0+t1)/2) sin((t1-t0)/2),
 // which does not cancel at the poles.
 double latlong_texel_solid_angle(int y, int width, int height) {

@@ -2,6 +2,8 @@
 
 // Exact solid angles, in steradians.
 
+#include <vector>
+
 #include "core/base/math.h"
 
 namespace lightkiln {
@@ -9,6 +11,22 @@ namespace lightkiln {
 // Texel (x, y) of a face of a cube with `size` texels a side. The six faces sum to 4 pi within
 // 1e-12.
 double cube_texel_solid_angle(int x, int y, int size);
+
+// Those of a whole face, each worked out once: what passes over all texels read.
+class CubeSolidAngles {
+ public:
+  explicit CubeSolidAngles(int size);
+  // As cube_texel_solid_angle().
+  double at(int x, int y) const {
+    const int column = 2 * x < size_ ? x : size_ - 1 - x, row = 2 * y < size_ ? y : size_ - 1 - y;
+    return texels_[static_cast<size_t>(row) * static_cast<size_t>((size_ + 1) / 2) +
+                   static_cast<size_t>(column)];
+  }
+
+ private:
+  int size_;
+  std::vector<double> texels_;  // of the quarter at the face's first corner, by rows
+};
 
 // The rectangle [x0, x1] x [y0, y1] of a plane at distance 1.
 double plane_solid_angle(double x0, double x1, double y0, double y1);

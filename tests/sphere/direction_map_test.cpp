@@ -96,6 +96,21 @@ TEST(SolidAngle, CubeFaceSumsToASixthOfTheSphere) {
 }
 
 // The positive control: the same four terms in float are off by a quarter of a texel at 1024.
+TEST(SolidAngle, OfAWholeFaceIsThatOfEachTexel) {
+  for (const int size : {1, 2, 3, 8, 37, 256}) {
+    const CubeSolidAngles face(size);
+    double sum = 0;
+    for (int y = 0; y < size; ++y) {
+      for (int x = 0; x < size; ++x) {
+        EXPECT_NEAR(face.at(x, y) / cube_texel_solid_angle(x, y, size), 1, 1e-10)
+            << x << " " << y << " of " << size;
+        sum += face.at(x, y);
+      }
+    }
+    EXPECT_NEAR(sum, 4 * kPi / 6, 1e-12) << size;
+  }
+}
+
 TEST(SolidAngle, WouldCancelInFloat) {
   const auto corner = [](float x, float y) {
     return std::atan2(x * y, std::sqrt(x * x + y * y + 1));

@@ -37,8 +37,8 @@ TEST(Fourier, EqualsTheDefinitionForAnyLength) {
     std::vector<Complex4> data(static_cast<size_t>(n)), work;
     for (int j = 0; j < n; ++j) {
       for (int lane = 0; lane < kLanes; ++lane) {
-        data[static_cast<size_t>(j)].re[lane] = std::sin(1.0 + j * j + lane);
-        data[static_cast<size_t>(j)].im[lane] = std::cos(2.0 * j - lane);
+        data[static_cast<size_t>(j)].re.set(lane, std::sin(1.0 + j * j + lane));
+        data[static_cast<size_t>(j)].im.set(lane, std::cos(2.0 * j - lane));
       }
     }
     const auto input = data;
