@@ -25,7 +25,8 @@ void write_axes(JsonWriter& writer) {
       .member("length_unit", "world units of the scene");
 }
 
-void write_radiance_convention(JsonWriter& writer) {
+void write_radiance_convention(JsonWriter& writer,
+                               FaceOrientation faces = FaceOrientation::openexr) {
   writer.key("convention")
       .begin_object()
       .member("basis", "real spherical harmonics, orthonormal, polar axis +Z")
@@ -36,8 +37,12 @@ void write_radiance_convention(JsonWriter& writer) {
       .member("units", "linear radiance as in the input; nothing is divided by pi")
       .member("colour_space", "linear Rec. 709")
       .member("latlong", "image centre +Z, +X left of it at longitude +pi/2, top row +Y")
-      .member("cube", "six faces stacked top to bottom: +X -X +Y -Y +Z -Z")
-      .member("texel_convention", "half_texel");
+      .member("cube", faces == FaceOrientation::opengl
+                          ? "six faces stacked top to bottom: +X -X +Y -Y +Z -Z of the world "
+                            "(-x, y, z), as OpenGL looks them up"
+                          : "six faces stacked top to bottom: +X -X +Y -Y +Z -Z");
+  write_faces(writer, faces);
+  writer.member("texel_convention", "half_texel");
   write_axes(writer);
   writer.end_object();
 }
@@ -118,6 +123,7 @@ void write_ao(JsonWriter& writer, const AoDocument& document) {
 // `own` writes what only this product says.
 void write_map(JsonWriter& writer, const MapDocument& map, const auto& own) {
   writer.begin_object().member("artifact", map.artifact).member("size", map.size);
+  write_faces(writer, map.faces);
   own();
   writer.member("error_bound", map.error_bound);
   write_measured(writer, map.measured);
@@ -236,7 +242,7 @@ void write_light_set(JsonWriter& writer, const LightSetDocument& set) {
 }
 
 void write_environment(JsonWriter& writer, const EnvironmentDocument& document) {
-  write_radiance_convention(writer);
+  write_radiance_convention(writer, document.faces);
   writer.key("source")
       .begin_object()
       .member("width", document.source_width)

@@ -49,6 +49,11 @@ void write_source_layout(JsonWriter& writer, const EnvironmentDocument& document
   writer.end_array();
 }
 
+void write_faces(JsonWriter& writer, FaceOrientation faces) {
+  if (faces != FaceOrientation::openexr)
+    writer.member("face_orientation", face_orientation_name(faces));
+}
+
 void write_layouts(JsonWriter& writer, const std::vector<LayoutDocument>& layouts) {
   writer.begin_array();
   for (const LayoutDocument& entry : layouts) {
@@ -59,6 +64,7 @@ void write_layouts(JsonWriter& writer, const std::vector<LayoutDocument>& layout
         .member("width", entry.layout.width)
         .member("height", faces ? entry.layout.width : entry.layout.height);
     write_form(writer, entry.layout);
+    write_faces(writer, entry.faces);
     writer.member("covered_share", covered_solid_angle(entry.layout) / (4 * kPi))
         .member("error_bound", entry.error_bound);
     write_measured(writer, entry.measured);

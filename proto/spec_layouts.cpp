@@ -74,7 +74,7 @@ ParameterGroup source_group() {
         false,
         "How the faces of a cube_strip or of six files are turned. openexr: as OpenEXR's cube. "
         "opengl: as the six images that OpenGL, Direct3D and engines on them look up, whose world "
-        "is (-x, y, z); px then shows what lies at -X of ours."},
+        "is (-x, y, z); px then shows what lies at -X of ours. Crosses are the same in either."},
        {"strict",
         +[](Spec& s) -> bool& { return parameters<T>(s).source.strict; },
         {},
@@ -130,7 +130,7 @@ ParameterRow convention_row() {
           {},
           false,
           "Texel centres at (i + 1/2)/N, as engines sample, or at i/(N - 1) with OpenEXR's envmap "
-          "attribute."};
+          "attribute (no cube in OpenGL's orientation carries it)."};
 }
 
 template <size_t Product>
@@ -205,6 +205,26 @@ ParameterGroup maps_rotation_group() {
 }
 ParameterGroup probes_rotation_group() {
   return rotation_group<ProbesParameters>();
+}
+
+ParameterGroup maps_cubes_group() {
+  return {"/parameters/cubes",
+          {{"face_orientation",
+            NameMember{{"openexr", "opengl"},
+                       [](const Spec& s) {
+                         return static_cast<size_t>(parameters<Maps>(s).cubes.face_orientation);
+                       },
+                       [](Spec& s, size_t i) {
+                         parameters<Maps>(s).cubes.face_orientation = FaceOrientation(i);
+                       }},
+            {},
+            false,
+            "How the faces of every cube are written: under layouts, of prefilter, sheen and "
+            "irradiance. openexr: as OpenEXR's cube. opengl: as OpenGL, Direct3D, Vulkan and "
+            "engines on them look up, whose world is (-x, y, z); px then shows what lies at -X of "
+            "ours. Crosses are the same in either."}},
+          [](const Spec& s) { return !(parameters<Maps>(s).cubes == CubeParameters{}); },
+          nullptr};
 }
 
 std::vector<ParameterGroup> layout_groups() {

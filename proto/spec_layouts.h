@@ -1,6 +1,6 @@
 #pragma once
 
-// Rows of parameters.source, parameters.rotation and parameters.layouts.
+// Rows of parameters.source, parameters.rotation, parameters.cubes and parameters.layouts.
 
 #include <vector>
 
@@ -13,6 +13,8 @@ ParameterGroup maps_source_group();
 ParameterGroup probes_source_group();
 ParameterGroup maps_rotation_group();
 ParameterGroup probes_rotation_group();
+// How environment_maps writes cubes.
+ParameterGroup maps_cubes_group();
 // The object of all layouts, then each of them.
 std::vector<ParameterGroup> layout_groups();
 

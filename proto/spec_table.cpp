@@ -282,6 +282,7 @@ KindTable environment_maps_table() {
                                         {"/parameters", {}}};
   groups.push_back(maps_source_group());
   groups.push_back(maps_rotation_group());
+  groups.push_back(maps_cubes_group());
   groups.push_back(maps_sh_group());
   groups.push_back(irradiance_group());
   groups.push_back(chain_group<&Maps::prefilter>("/parameters/prefilter", 0));

@@ -23,6 +23,7 @@
 #include "core/bake/plan.h"
 #include "core/base/progress.h"
 #include "core/environment/light_set.h"
+#include "core/environment/lookup_cube.h"
 #include "core/environment/round_trip.h"
 #include "core/environment/sun_extraction.h"
 #include "core/image/image.h"
@@ -105,7 +106,8 @@ struct MapDocument {
   double roughness = 0;    // of a prefiltered level
   double error_bound = 0;  // rms over the sphere, relative to the output's mean; DFG: absolute
   MeasuredError measured;
-  int level = 0;  // of a chain; in a mip-mapped file its place
+  int level = 0;                                     // of a chain; in a mip-mapped file its place
+  FaceOrientation faces = FaceOrientation::openexr;  // of cubes
 };
 // Irradiance of the first bands alone differs from the whole by this much of its mean.
 struct IrradianceDocument : MapDocument {
@@ -141,9 +143,10 @@ struct AssetDocument {
 };
 // The map in another layout.
 struct LayoutDocument {
-  std::string name;                     // as ordered: "octahedral"
-  std::vector<std::string> artifacts;   // one; of cube_faces six, +X -X +Y -Y +Z -Z
-  MapLayout layout;                     // of cube_faces: the strip of its faces
+  std::string name;                                  // as ordered: "octahedral"
+  std::vector<std::string> artifacts;                // one; of cube_faces six, +X -X +Y -Y +Z -Z
+  MapLayout layout;                                  // of cube_faces: the strip of its faces
+  FaceOrientation faces = FaceOrientation::openexr;  // of cubes
   // Of a texel's value, relative to the source's mean or to the brightest texel that it shows,
   // whichever is more: rms. 0 where texels are only moved.
   double error_bound = 0;
@@ -173,6 +176,7 @@ struct EnvironmentDocument {
   PixelRepairs repairs;
   Vec3d mean;
   double max_luminance = 0;
+  FaceOrientation faces = FaceOrientation::openexr;  // of every cube below
   std::optional<ShDocument> sh;
   MeasuredError sh_measured;
   std::optional<ShWindowReport> sh_window;  // of a window other than none

@@ -51,7 +51,7 @@ std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_m
       spec,
       grants,
       decoded.format,
-      light_warnings(decoded),
+      source_warnings(*spec.environment, inputs, parameters.source, decoded),
       MapsLight(make_environment(std::move(decoded),
                                  environment_reading(*spec.environment, parameters.source),
                                  rotation_of(parameters.rotation), grants.threads),
@@ -358,7 +358,9 @@ Assembly environment_maps_assemble(EnvironmentMapsState& state, const Plan& plan
                                    std::span<const ChunkResult> chunks, Progress& progress) {
   MapsResult result;
   result.threads = state.grants.threads;
+  result.faces = state.parameters().cubes.face_orientation;
   EnvironmentDocument& document = result.document;
+  document.faces = result.faces;
   const Environment& environment = state.light.environment();
   document.source_width = environment.source_layout.width;
   document.source_height = environment.source_layout.height;

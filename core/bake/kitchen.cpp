@@ -42,6 +42,25 @@ DecodedImage decode_environment(const InputRef& ref, const Inputs& inputs) {
   return cube.take();
 }
 
+std::vector<std::string> source_warnings(const InputRef& ref, const Inputs& inputs,
+                                         const SourceParameters& parameters,
+                                         const DecodedImage& decoded) {
+  std::vector<std::string> warnings = light_warnings(decoded);
+  const std::string read_as = face_orientation_name(parameters.face_orientation);
+  const LayoutKind kind = environment_reading(ref, parameters).layout.value_or(LayoutKind::latlong);
+  if (kind != LayoutKind::cube_strip) return warnings;
+  std::vector<std::string> files = ref.faces;
+  if (files.empty()) files.push_back(ref.blob);
+  for (const std::string& digest : files) {
+    const std::string said = exr_text(blob_of(digest, inputs), kFaceOrientationAttribute);
+    if (said.empty() || said == read_as) continue;
+    warnings.push_back("The file says that its faces are turned as " + printable(said) +
+                       "; source.face_orientation reads them as " + read_as + ".");
+    break;
+  }
+  return warnings;
+}
+
 SourceReading environment_reading(const InputRef& ref, const SourceParameters& parameters) {
   SourceReading reading = reading_of(parameters);
   if (!ref.faces.empty()) reading.layout = LayoutKind::cube_strip;

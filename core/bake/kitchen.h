@@ -16,6 +16,11 @@ std::span<const std::byte> blob_bytes(const InputRef& ref, const Inputs& inputs)
 // Decodes the environment's file or its six, see decode_light_image() and CubeOfFaces, whose
 // errors it throws, with the face's name where it is one of six.
 DecodedImage decode_environment(const InputRef& ref, const Inputs& inputs);
+// What a plan warns of: light_warnings() of what was decoded, and files that say that their faces
+// are turned otherwise than the order reads them.
+std::vector<std::string> source_warnings(const InputRef& ref, const Inputs& inputs,
+                                         const SourceParameters& parameters,
+                                         const DecodedImage& decoded);
 // How it is to be read: six files are a cube_strip.
 SourceReading environment_reading(const InputRef& ref, const SourceParameters& parameters);
 

@@ -28,7 +28,8 @@ struct SourceParameters {
   // angular, mirror_ball: left and right are exchanged, as on a photograph of a ball. Refused for
   // other layouts.
   bool mirrored = false;
-  // Of a cube_strip, or of a cube that comes as six files. Refused for other layouts.
+  // Of a cube_strip, or of a cube that comes as six files; of a cross, which is the same picture in
+  // either. Refused for other layouts.
   FaceOrientation face_orientation = FaceOrientation::openexr;
   // NaN, infinite and negative pixels are refused with their counts; else set to 0 and counted.
   bool strict = false;
@@ -46,6 +47,16 @@ struct RotationParameters {
   friend bool operator==(const RotationParameters&, const RotationParameters&) = default;
 };
 Rotation rotation_of(const RotationParameters& parameters);
+
+// How every cube of an order is written.
+struct CubeParameters {
+  // Of cube_strip, cube_faces and crosses under layouts, prefilter, sheen and irradiance. Texels
+  // are moved, at no cost worth telling; crosses are the same picture in either. opengl is refused
+  // where no cube is ordered.
+  FaceOrientation face_orientation = FaceOrientation::openexr;
+
+  friend bool operator==(const CubeParameters&, const CubeParameters&) = default;
+};
 
 struct LayoutOutput {
   // Texels: width of a lat-long map (even) or cylinder (even), 2..8192; side of a face, 1..2048 (2

@@ -18,8 +18,8 @@ class IrradianceCube : public ConvolvedCube {
 
   void file(ByteReader& reader, const MeasuredError& measured, MapsResult* result) const override {
     add_cube("irradiance.exr", read(reader), {{"lightkiln.quantity", kQuantity}}, result);
-    result->document.irradiance =
-        IrradianceDocument{{"irradiance.exr", size(), 0, error_bound(), measured}, {}};
+    result->document.irradiance = IrradianceDocument{
+        {"irradiance.exr", size(), 0, error_bound(), measured, 0, result->faces}, {}};
   }
 };
 
@@ -94,11 +94,11 @@ class BandedIrradianceCube : public MapsOutput {
     Image cube(size_, 6 * size_, 3);
     reader.floats(cube.pixels);
     const double rms = reader.f64(), most = reader.f64();
-    add_cube("irradiance.exr", cube,
+    add_cube("irradiance.exr", std::move(cube),
              {{"lightkiln.quantity", kQuantity}, {"lightkiln.bands", std::to_string(bands_)}},
              result);
     result->document.irradiance = IrradianceDocument{
-        {"irradiance.exr", size_, 0, error_bound(), measured}, bands_, rms, most};
+        {"irradiance.exr", size_, 0, error_bound(), measured, 0, result->faces}, bands_, rms, most};
   }
 
  private:

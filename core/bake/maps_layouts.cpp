@@ -15,18 +15,23 @@ namespace lightkiln {
 
 namespace {
 
-std::string describe(const MapLayout& layout) {
+std::string describe(const MapLayout& layout, FaceOrientation faces) {
+  const bool opengl = faces == FaceOrientation::opengl;
   const std::string side = layout.mirrored ? "left and right exchanged, +X to the right of +Z"
                                            : "seen from inside, unmirrored, -X to the right of +Z";
   switch (layout.kind) {
     case LayoutKind::latlong:
       return "latlong: centre +Z, +X a quarter left of it, top row +Y, seen from inside";
     case LayoutKind::cube_strip:
-      return "cube: six faces from the top, +X -X +Y -Y +Z -Z, as OpenEXR orients them";
+      return describe_strip(faces);
     case LayoutKind::horizontal_cross:
-      return "horizontal cross: row +X +Z -X -Z, +Y above +Z, -Y below it, unfolded";
+      return opengl ? "horizontal cross: row -X +Z +X -Z of the world (-x, y, z), +Y above +Z, -Y "
+                      "below it, unfolded: upright squares as OpenGL looks them up"
+                    : "horizontal cross: row +X +Z -X -Z, +Y above +Z, -Y below it, unfolded";
     case LayoutKind::vertical_cross:
-      return "vertical cross: column +Y +Z -Y -Z, +X left and -X right of +Z, unfolded";
+      return opengl ? "vertical cross: column +Y +Z -Y -Z of the world (-x, y, z), -X left and +X "
+                      "right of +Z, unfolded: squares as OpenGL looks them up, -Z upside down"
+                    : "vertical cross: column +Y +Z -Y -Z, +X left and -X right of +Z, unfolded";
     case LayoutKind::angular:
       return "angular map: centre +Z, radius = angle / 180 degrees, " + side;
     case LayoutKind::mirror_ball:
@@ -124,6 +129,9 @@ class LayoutImage : public MapsOutput {
     LayoutDocument entry;
     entry.name = layout_product_name(product_);
     entry.layout = layout_;
+    if (is_cube(layout_.kind)) entry.faces = result->faces;
+    if (layout_.kind == LayoutKind::cube_strip)
+      image = ordered_faces(std::move(image), result->faces);
     entry.error_bound = error_bound();
     entry.measured = measured;
     if (reader.u64() != 0) entry.round_trip = read_trip(reader);
@@ -133,17 +141,13 @@ class LayoutImage : public MapsOutput {
         const std::string name = stem + "_" + kCubeFaceNames[static_cast<size_t>(face)] + ".exr";
         Image part(layout_.width, layout_.width, 3);
         std::copy_n(image.at(0, face * layout_.width), part.pixels.size(), part.pixels.begin());
-        write(part, name, describe(layout_) + "; this file: face " + kCubeFaceNames[size_t(face)],
-              EnvmapAttribute::none, result);
+        write(part, name,
+              describe(layout_, entry.faces) + "; this file: face " + kCubeFaceNames[size_t(face)],
+              entry.faces, result);
         entry.artifacts.push_back(name);
       }
     } else {
-      const bool borders = layout_.convention == TexelConvention::openexr;
-      const EnvmapAttribute attribute = !borders ? EnvmapAttribute::none
-                                        : layout_.kind == LayoutKind::latlong
-                                            ? EnvmapAttribute::latlong
-                                            : EnvmapAttribute::cube;
-      write(image, stem + ".exr", describe(layout_), attribute, result);
+      write(image, stem + ".exr", describe(layout_, entry.faces), entry.faces, result);
       entry.artifacts.push_back(stem + ".exr");
     }
     result->document.layouts.push_back(std::move(entry));
@@ -164,16 +168,23 @@ class LayoutImage : public MapsOutput {
     return trip;
   }
 
-  // OpenEXR's attribute is written exactly where its texel centres are.
+  // OpenEXR's attribute is written exactly where its texel centres and its orientation are.
+  EnvmapAttribute envmap(FaceOrientation faces) const {
+    if (layout_.convention != TexelConvention::openexr) return EnvmapAttribute::none;
+    if (layout_.kind == LayoutKind::latlong) return EnvmapAttribute::latlong;
+    return faces == FaceOrientation::openexr ? EnvmapAttribute::cube : EnvmapAttribute::none;
+  }
+
   void write(const Image& image, const std::string& name, const std::string& layout,
-             EnvmapAttribute attribute, MapsResult* result) const {
+             FaceOrientation faces, MapsResult* result) const {
     ExrWriteOptions options;
     options.pixel_type = ExrPixelType::float32;
-    options.envmap = attribute;
+    options.envmap = envmap(faces);
     options.attributes["lightkiln.layout"] = layout;
     options.attributes["lightkiln.texel_convention"] =
-        attribute == EnvmapAttribute::none ? "half_texel: texel centres at (i + 1/2)/N"
-                                           : "openexr: texel centres at i/(N - 1)";
+        layout_.convention == TexelConvention::openexr ? "openexr: texel centres at i/(N - 1)"
+                                                       : "half_texel: texel centres at (i + 1/2)/N";
+    tell_faces(faces, &options.attributes);
     options.attributes["lightkiln.covered_share"] =
         short_number(covered_solid_angle(layout_) / (4 * kPi));
     options.threads = result->threads;

@@ -99,29 +99,46 @@ namespace {
 
 // Half-texel centres are what engines sample. OpenEXR's `envmap` attribute would claim centres on
 // the borders and is therefore not written; these attributes say what the file is.
-ExrWriteOptions cube_options(std::map<std::string, std::string> attributes, int threads) {
+ExrWriteOptions cube_options(std::map<std::string, std::string> attributes,
+                             const MapsResult& result) {
   ExrWriteOptions options;
   options.pixel_type = ExrPixelType::float32;
   options.attributes = std::move(attributes);
-  options.attributes.emplace("lightkiln.layout",
-                             "cube: six faces from the top, +X -X +Y -Y +Z -Z, as OpenEXR orients "
-                             "them");
+  options.attributes.emplace("lightkiln.layout", describe_strip(result.faces));
   options.attributes.emplace("lightkiln.texel_convention",
                              "half_texel: texel centres at (i + 1/2)/N of a face");
-  options.threads = threads;
+  tell_faces(result.faces, &options.attributes);
+  options.threads = result.threads;
   return options;
 }
 
 }  // namespace
 
-void add_cube(const std::string& name, const Image& cube,
-              std::map<std::string, std::string> attributes, MapsResult* result) {
-  add_image(name, cube, cube_options(std::move(attributes), result->threads), &result->assembly);
+std::string describe_strip(FaceOrientation faces) {
+  return std::string("cube: six faces from the top, +X -X +Y -Y +Z -Z") +
+         (faces == FaceOrientation::opengl ? " of the world (-x, y, z), as OpenGL looks them up"
+                                           : ", as OpenEXR orients them");
 }
 
-void add_mip_mapped_cube(const std::string& name, std::span<const Image> levels,
+Image ordered_faces(Image strip, FaceOrientation faces) {
+  return faces == FaceOrientation::opengl ? strip_to_opengl(strip) : std::move(strip);
+}
+
+void tell_faces(FaceOrientation faces, std::map<std::string, std::string>* attributes) {
+  if (faces == FaceOrientation::openexr) return;
+  (*attributes)[kFaceOrientationAttribute] = face_orientation_name(faces);
+}
+
+void add_cube(const std::string& name, Image cube, std::map<std::string, std::string> attributes,
+              MapsResult* result) {
+  add_image(name, ordered_faces(std::move(cube), result->faces),
+            cube_options(std::move(attributes), *result), &result->assembly);
+}
+
+void add_mip_mapped_cube(const std::string& name, std::vector<Image> levels,
                          std::map<std::string, std::string> attributes, MapsResult* result) {
-  add_mip_mapped_image(name, levels, cube_options(std::move(attributes), result->threads),
+  for (Image& level : levels) level = ordered_faces(std::move(level), result->faces);
+  add_mip_mapped_image(name, levels, cube_options(std::move(attributes), *result),
                        &result->assembly);
 }
 

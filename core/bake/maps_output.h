@@ -22,8 +22,9 @@ struct SpectrumNeed {
 // What outputs file what they made in.
 struct MapsResult {
   Assembly assembly;
-  EnvironmentDocument document;  // becomes the assembly's
-  int threads = 1;               // to encode images on
+  EnvironmentDocument document;                      // becomes the assembly's
+  int threads = 1;                                   // to encode images on
+  FaceOrientation faces = FaceOrientation::openexr;  // of every cube that is filed
 };
 
 class MapsOutput {
@@ -108,11 +109,18 @@ class ErrorMeter {
 void judge_output(double bound, const MeasuredError& measured, double target, ChunkReport* report,
                   Round* round);
 
-// Adds a cube as six faces in one strip, with text attributes saying so.
-void add_cube(const std::string& name, const Image& cube,
-              std::map<std::string, std::string> attributes, MapsResult* result);
+// Of a strip of faces, for its text attribute.
+std::string describe_strip(FaceOrientation faces);
+// A strip of faces, made in our orientation, as the order has it filed.
+Image ordered_faces(Image strip, FaceOrientation faces);
+// Adds to the text attributes of a file of faces what is to be said of their orientation.
+void tell_faces(FaceOrientation faces, std::map<std::string, std::string>* attributes);
+
+// Adds a cube as six faces in one strip, turned as ordered, with text attributes saying so.
+void add_cube(const std::string& name, Image cube, std::map<std::string, std::string> attributes,
+              MapsResult* result);
 // All levels of a chain in one file.
-void add_mip_mapped_cube(const std::string& name, std::span<const Image> levels,
+void add_mip_mapped_cube(const std::string& name, std::vector<Image> levels,
                          std::map<std::string, std::string> attributes, MapsResult* result);
 
 extern const MapsProduct kSunProduct;

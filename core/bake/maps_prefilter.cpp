@@ -56,7 +56,7 @@ class ChainLevel : public ConvolvedCube {
       add_cube(name, read(reader), attributes, result);
     }
     auto& levels = chain_->sheen() ? result->document.sheen : result->document.prefilter;
-    levels.push_back({name, size(), roughness_, error_bound(), measured, level_});
+    levels.push_back({name, size(), roughness_, error_bound(), measured, level_, result->faces});
   }
 
  private:

@@ -182,10 +182,11 @@ void check_source(const SourceParameters& p, const Spec& spec, Checker& checker)
   if (six_files && p.layout && p.layout != LayoutKind::cube_strip)
     checker.fault(pointer + "/layout", "conflict",
                   "Six faces are a cube: layout is auto or cube_strip.", "auto, cube_strip");
-  if (p.face_orientation != FaceOrientation::openexr && !six_files &&
-      p.layout != LayoutKind::cube_strip)
+  const bool cube = six_files || (p.layout && is_cube(*p.layout));
+  if (p.face_orientation != FaceOrientation::openexr && !cube)
     checker.fault(pointer + "/face_orientation", "conflict",
-                  "face_orientation belongs to six faces and to the layout cube_strip.");
+                  "face_orientation belongs to six faces and to the layouts cube_strip, "
+                  "horizontal_cross and vertical_cross.");
   const bool ball = p.layout == LayoutKind::mirror_ball;
   if (p.distance && !ball)
     checker.fault(pointer + "/distance", "conflict", "distance belongs to the layout mirror_ball.");
@@ -235,6 +236,19 @@ void check_layouts(const LayoutOrders& orders, Checker& checker) {
     if (layout.kind == LayoutKind::latlong && borders && order.size < 4)
       checker.fault(pointer + "/width", "range", "width must be at least 4 with openexr.");
   }
+}
+
+void check_cubes(const EnvironmentMapsParameters& p, Checker& checker) {
+  if (p.cubes.face_orientation == FaceOrientation::openexr) return;
+  bool cube = p.irradiance || p.prefilter || p.sheen || p.layouts[kCubeFaces];
+  for (size_t product = 0; product < kCubeFaces; ++product)
+    cube |= p.layouts[product] && is_cube(static_cast<LayoutKind>(product));
+  if (!cube)
+    checker.fault("/parameters/cubes/face_orientation", "conflict",
+                  "face_orientation turns the cubes that an order writes, and none is ordered: "
+                  "prefilter, sheen, irradiance, or cube_strip, cube_faces, horizontal_cross or "
+                  "vertical_cross of layouts.",
+                  "openexr");
 }
 
 void check_irradiance(const IrradianceOutput& irradiance, Checker& checker) {
@@ -301,6 +315,7 @@ void check_environment_maps(const EnvironmentMapsParameters& p, Checker& checker
         "layouts and light_set.");
   check_rotation(p.rotation, checker);
   check_layouts(p.layouts, checker);
+  check_cubes(p, checker);
   if (p.sh) check_sh(*p.sh, checker);
   if (p.spectrum) checker.between(p.spectrum->bands, 1, 129, "/parameters/spectrum/bands", "bands");
   if (p.sun) check_sun(*p.sun, checker);

@@ -123,6 +123,7 @@ struct EnvironmentMapsParameters {
   std::optional<SpectrumOutput> spectrum;
   std::optional<AssetOutput> asset;
   LayoutOrders layouts;  // by product, see layout_orders.h
+  CubeParameters cubes;
   std::optional<LightSetOutput> light_set;
   std::optional<SunOrder> sun;
   // At least one of these is ordered.

@@ -92,7 +92,10 @@ Environment make_environment(DecodedImage decoded, const SourceReading& reading,
   Image image = to_rgb(std::move(decoded.image));
   environment.repairs = sanitise(image);
   if (reading.strict) refuse_repairs(environment.repairs);
-  if (reading.face_orientation == FaceOrientation::opengl) image = strip_from_opengl(image);
+  if (reading.face_orientation == FaceOrientation::opengl &&
+      environment.source_layout.kind == LayoutKind::cube_strip) {
+    image = strip_from_opengl(image);
+  }
   const bool turned = !rotation.is_identity();
   const std::optional<int> columns = whole_columns(environment.source_layout, rotation);
   if (columns && *columns == 0) {

@@ -46,21 +46,42 @@ StripTexel strip_texel(int face, int x, int y, int size) {
           from * size + std::min(static_cast<int>(t * size), size - 1)};
 }
 
+// Where a whole face of OpenGL's stands in our strip: a turn or a flip, told by three corners.
+struct FaceMove {
+  StripTexel origin;     // of (0, 0)
+  int right_x, right_y;  // a step in x
+  int down_x, down_y;    // a step in y
+
+  FaceMove(int face, int size) : origin(strip_texel(face, 0, 0, size)) {
+    const int last = std::max(1, size - 1);
+    const StripTexel right = strip_texel(face, size - 1, 0, size);
+    const StripTexel down = strip_texel(face, 0, size - 1, size);
+    right_x = (right.x - origin.x) / last, right_y = (right.y - origin.y) / last;
+    down_x = (down.x - origin.x) / last, down_y = (down.y - origin.y) / last;
+  }
+  StripTexel at(int x, int y) const {
+    return {origin.x + x * right_x + y * down_x, origin.y + x * right_y + y * down_y};
+  }
+};
+
 // visit(texel of OpenGL's strip, texel of ours) for every texel.
 template <typename Visit>
 void for_each_pair(const Image& strip, const Visit& visit) {
   const int size = strip.width;
   assert(strip.height == 6 * size);
   for (int face = 0; face < 6; ++face) {
+    const FaceMove move(face, size);
     for (int y = 0; y < size; ++y) {
-      for (int x = 0; x < size; ++x) {
-        visit(StripTexel{x, face * size + y}, strip_texel(face, x, y, size));
-      }
+      for (int x = 0; x < size; ++x) visit(StripTexel{x, face * size + y}, move.at(x, y));
     }
   }
 }
 
 }  // namespace
+
+const char* face_orientation_name(FaceOrientation orientation) {
+  return orientation == FaceOrientation::opengl ? "opengl" : "openexr";
+}
 
 Image strip_to_opengl(const Image& strip) {
   Image theirs(strip.width, strip.height, strip.channels);
@@ -82,9 +103,10 @@ Image lookup_face(const Image& strip, int face) {
   const int size = strip.width;
   assert(strip.height == 6 * size);
   Image image(size, size, strip.channels);
+  const FaceMove move(face, size);
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
-      const StripTexel from = strip_texel(face, x, size - 1 - y, size);
+      const StripTexel from = move.at(x, size - 1 - y);
       std::copy_n(strip.at(from.x, from.y), strip.channels, image.at(x, y));
     }
   }

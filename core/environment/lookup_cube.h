@@ -11,13 +11,19 @@
 
 namespace lightkiln {
 
-// How the six square images of a cube, +X -X +Y -Y +Z -Z, are turned.
+// How the six square images of a cube, +X -X +Y -Y +Z -Z, are turned. Crosses are the same picture
+// in either: cut into upright squares they are OpenGL's faces.
 enum class FaceOrientation {
   openexr,  // as OpenEXR's cube, which is ours: see direction_map.h
   opengl,   // as above, rows from the top as image files have them
 };
+// As in specs and files: "openexr", "opengl".
+const char* face_orientation_name(FaceOrientation orientation);
+// The text attribute by which an OpenEXR file of ours names it; openexr goes without.
+inline constexpr const char* kFaceOrientationAttribute = "lightkiln.face_orientation";
 
-// Strips of six faces, N x 6N, from one orientation to the other.
+// Strips of six faces, N x 6N, from one orientation to the other, texels of either convention. The
+// one undoes the other to the bit.
 Image strip_to_opengl(const Image& strip);
 Image strip_from_opengl(const Image& strip);
 

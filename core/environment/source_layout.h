@@ -17,7 +17,8 @@ struct SourceReading {
   std::optional<TexelConvention> convention = {};
   double camera_distance = 0;  // mirror_ball: as in MapLayout
   bool mirrored = false;       // angular, mirror_ball: as in MapLayout
-  FaceOrientation face_orientation = FaceOrientation::openexr;  // cube_strip
+  // cube_strip; crosses are the same in either
+  FaceOrientation face_orientation = FaceOrientation::openexr;
   bool strict = false;  // refuses pixels that would be repaired
 };
 

@@ -32,6 +32,10 @@ struct ExrWriteOptions {
 // as stored (the conversion of a pixel that holds one spreads it to all three channels).
 DecodedImage read_exr(std::span<const std::byte> bytes);
 
+// The text attribute `name` of the part that read_exr reads; "" where the file has none, or is not
+// OpenEXR. Throws as read_exr for an OpenEXR file without such a part.
+std::string exr_text(std::span<const std::byte> bytes, const std::string& name);
+
 // Every level of a mip-mapped file that read_exr reads, level 0 first, to 1 x 1; one image of any
 // other file. Throws as read_exr.
 std::vector<Image> read_exr_levels(std::span<const std::byte> bytes);

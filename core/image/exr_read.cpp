@@ -8,6 +8,7 @@
 #include <ImfMultiPartInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfRgbaFile.h>
+#include <ImfStringAttribute.h>
 #include <ImfTiledInputPart.h>
 #include <ImfVersion.h>
 
@@ -110,9 +111,13 @@ Image read_luminance_chroma(std::span<const std::byte> bytes, const Box2i& windo
   });
 }
 
-void check_version(std::span<const std::byte> bytes) {
+bool has_exr_magic(std::span<const std::byte> bytes) {
   constexpr unsigned char kMagic[4] = {0x76, 0x2f, 0x31, 0x01};
-  if (bytes.size() < 8 || std::memcmp(bytes.data(), kMagic, 4) != 0)
+  return bytes.size() >= 8 && std::memcmp(bytes.data(), kMagic, 4) == 0;
+}
+
+void check_version(std::span<const std::byte> bytes) {
+  if (!has_exr_magic(bytes))
     throw Error(ErrorCode::invalid_input,
                 "The file is not an OpenEXR image: its first bytes differ.");
   const auto flags = std::to_integer<unsigned>(bytes[5]);
@@ -189,6 +194,15 @@ std::vector<Image> read_mip_levels(std::span<const std::byte> bytes, OpenFile& o
 DecodedImage read_exr(std::span<const std::byte> bytes) {
   return with_exr_library(ErrorCode::invalid_input, "The OpenEXR image is malformed",
                           [&] { return read_checked(bytes); });
+}
+
+std::string exr_text(std::span<const std::byte> bytes, const std::string& name) {
+  if (!has_exr_magic(bytes)) return {};
+  return with_exr_library(ErrorCode::invalid_input, "The OpenEXR image is malformed", [&] {
+    const OpenFile open(bytes);
+    const auto* text = open.header().findTypedAttribute<Imf::StringAttribute>(name);
+    return text != nullptr ? text->value() : std::string();
+  });
 }
 
 std::vector<Image> read_exr_levels(std::span<const std::byte> bytes) {

@@ -212,6 +212,17 @@ TEST(Exr, NamesTheFormatThatItRead) {
   EXPECT_EQ(read_exr(make_exr(ramp(4, 4, 3), recipe)).format, "OpenEXR, 32-bit float, DWAB, tiled");
 }
 
+TEST(Exr, TellsATextAttributeByItsName) {
+  ExrWriteOptions options;
+  options.attributes = {{"lightkiln.layout", "cube"}};
+  const std::vector<std::byte> file = write_exr(Image(2, 2, 3), options);
+  EXPECT_EQ(exr_text(file, "lightkiln.layout"), "cube");
+  EXPECT_EQ(exr_text(file, "lightkiln.other"), "");
+  EXPECT_EQ(exr_text(file, "compression"), "");  // stands there, but is no text
+  EXPECT_EQ(exr_text(std::vector<std::byte>(100), "lightkiln.layout"), "");
+  EXPECT_REFUSED(exr_text(std::span(file).first(40), "lightkiln.layout"), invalid_input, "OpenEXR");
+}
+
 TEST(Exr, EqualPixelsGiveEqualBytes) {
   ExrWriteOptions options;
   options.attributes = {{"lightkiln:job", "42"}, {"comments", "one line"}};

@@ -143,6 +143,44 @@ TEST(DocumentJson, CarriesConventionAndSelftest) {
             sha256_digest("\x07", 1));
 }
 
+TEST(DocumentJson, SaysOfEveryCubeHowItsFacesAreTurned) {
+  Spec spec;
+  spec.environment = InputRef{sha256_digest("x", 1), {}};
+  spec.parameters = EnvironmentMapsParameters{};
+  Plan plan;
+  plan.kind = Kind::environment_maps;
+  const auto write = [&](FaceOrientation faces) {
+    EnvironmentDocument document;
+    document.faces = faces;
+    document.irradiance.emplace().faces = faces;
+    document.prefilter.emplace_back().faces = faces;
+    document.dfg.emplace();
+    LayoutDocument strip;
+    strip.name = "cube_strip";
+    strip.artifacts = {"layout_cube_strip.exr"};
+    strip.layout = make_layout(LayoutKind::cube_strip, 8);
+    strip.faces = faces;
+    document.layouts.push_back(strip);
+    Assembly assembly;
+    assembly.document = document;
+    return read_trusted_json(write_document(assembly, spec, plan), ErrorCode::internal, "x");
+  };
+  const JsonValue theirs = write(FaceOrientation::opengl), ours = write(FaceOrientation::openexr);
+  const auto cubes = [](const JsonValue& json) {
+    return std::vector{json.find("convention"), json.find("irradiance"),
+                       &json.find("prefilter")->array()->at(0),
+                       &json.find("layouts")->array()->at(0)};
+  };
+  for (const JsonValue* cube : cubes(theirs)) {
+    ASSERT_NE(cube->find("face_orientation"), nullptr);
+    EXPECT_EQ(*cube->find("face_orientation")->string(), "opengl");
+  }
+  for (const JsonValue* cube : cubes(ours)) EXPECT_EQ(cube->find("face_orientation"), nullptr);
+  EXPECT_EQ(theirs.find("dfg")->find("face_orientation"), nullptr);
+  EXPECT_NE(theirs.find("convention")->find("cube")->string()->find("(-x, y, z)"),
+            std::string::npos);
+}
+
 TEST(DocumentJson, CountsTheVerticesThatFellShort) {
   AoDocument document;
   document.vertices = 9;

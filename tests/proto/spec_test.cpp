@@ -147,6 +147,36 @@ TEST(SpecJson, TakesAnEnvironmentAsSixFaces) {
             Told{"/inputs/environment/resources unknown"});
 }
 
+TEST(SpecJson, TakesHowCubesAreWritten) {
+  const auto order = [](const std::string& parameters) {
+    return R"({"kind":"environment_maps","inputs":{"environment":)" + kA + R"(},"parameters":{)" +
+           parameters + "}}";
+  };
+  const auto parsed = parse_spec(order(R"("irradiance":{},"cubes":{"face_orientation":"opengl"})"));
+  ASSERT_TRUE(parsed.faults.empty()) << parsed.faults[0].message;
+  EXPECT_EQ(std::get<EnvironmentMapsParameters>(parsed.spec.parameters).cubes.face_orientation,
+            FaceOrientation::opengl);
+  const std::string canonical = canonical_spec(parsed.spec);
+  EXPECT_NE(canonical.find(R"("cubes":{"face_orientation":"opengl"})"), std::string::npos);
+  EXPECT_EQ(canonical_spec(parse_spec(canonical).spec), canonical);
+  // The default is the same order as none, under the same digest as ever.
+  const std::string plain = canonical_spec(parse_spec(order(R"("irradiance":{})")).spec);
+  for (const char* cubes : {"{}", R"({"face_orientation":"openexr"})"})
+    EXPECT_EQ(
+        canonical_spec(parse_spec(order(std::string(R"("irradiance":{},"cubes":)") + cubes)).spec),
+        plain);
+  EXPECT_EQ(plain.find("cubes"), std::string::npos);
+
+  const auto told = [&](const std::string& parameters) { return faults_of(order(parameters)); };
+  EXPECT_EQ(told(R"("sh":{},"cubes":{"face_orientation":"opengl"})"),
+            Told{"/parameters/cubes/face_orientation conflict"});
+  EXPECT_EQ(told(R"("irradiance":{},"cubes":{"face_orientation":"vulkan"})"),
+            Told{"/parameters/cubes/face_orientation range"});
+  EXPECT_EQ(told(R"("irradiance":{},"cubes":{"orientation":"opengl"})"),
+            Told{"/parameters/cubes/orientation unknown"});
+  EXPECT_EQ(told(R"("irradiance":{},"cubes":"opengl")"), Told{"/parameters/cubes type"});
+}
+
 TEST(SpecCanonical, IsStableUnderOrderSpaceAndDefaults) {
   const std::string plain = ao("");
   const std::string spelled =
@@ -266,6 +296,8 @@ Spec random_spec() {
     if (*rc::gen::arbitrary<bool>())
       maps->irradiance = IrradianceOutput{.method = IrradianceMethod::harmonics,
                                           .bands = *rc::gen::inRange(1, 34)};
+    if (maps->irradiance || maps->sheen)
+      maps->cubes.face_orientation = FaceOrientation(*rc::gen::inRange(0, 2));
   } else {
     auto& probes = std::get<ProbesParameters>(spec.parameters);
     const int count = *rc::gen::inRange(1, 5);
