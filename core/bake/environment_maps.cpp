@@ -2,7 +2,6 @@
 // bytes are its outputs' values in order, then what was measured of the error of each.
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <mutex>
 
@@ -183,7 +182,7 @@ double model_seconds(MapsLight& light, const MapsOutputs& outputs, int check_tex
     const double row = bands <= direct_row_orders(map.width)
                            ? kDirectPerTexel + kDirectPerOrder * bands
                            : kFourierPerPoint * std::log2(width + 1) *
-                                 (std::has_single_bit(unsigned(map.width)) ? 1 : kOddFourier);
+                                 (Fourier::transforms_directly(map.width) ? 1 : kOddFourier);
     const int points = row_points(map.height, lobes_of(outputs), sh_need_of(outputs));
     seconds += row * width * height + kLegendrePerTerm * points * height * bands * bands;
   }

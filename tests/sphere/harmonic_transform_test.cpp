@@ -32,7 +32,7 @@ double worst_difference(const ShRgb& a, const ShRgb& b) {
 }
 
 TEST(Fourier, EqualsTheDefinitionForAnyLength) {
-  for (const int n : {1, 2, 4, 6, 8, 10, 32, 50, 74}) {
+  for (const int n : {1, 2, 3, 4, 5, 6, 7, 8, 10, 14, 15, 32, 45, 50, 60, 74, 90, 100}) {
     const Fourier fourier(n);
     std::vector<Complex4> data(static_cast<size_t>(n)), work;
     for (int j = 0; j < n; ++j) {
@@ -57,6 +57,12 @@ TEST(Fourier, EqualsTheDefinitionForAnyLength) {
       EXPECT_NEAR(data[j].re[3] / n, input[j].re[3], 1e-13);
     }
   }
+}
+
+// Which lengths go which way, so that the test above is known to have seen both.
+TEST(Fourier, TakesProductsOfTwoThreeAndFiveAsTheyAre) {
+  for (const int n : {1, 2, 3, 45, 1440, 6000}) EXPECT_TRUE(Fourier::transforms_directly(n)) << n;
+  for (const int n : {7, 14, 74, 1442}) EXPECT_FALSE(Fourier::transforms_directly(n)) << n;
 }
 
 TEST(Quadrature, IsExactToDegreeTwiceThePointsLessOne) {
