@@ -7,6 +7,7 @@
 #include "core/base/parallel.h"
 #include "core/environment/layout_convert.h"
 #include "core/environment/layout_sample.h"
+#include "core/sphere/radial_map.h"
 #include "core/sphere/texel_density.h"
 
 namespace lightkiln {
@@ -31,9 +32,19 @@ struct Sums {
   }
 };
 
-// Solid angle of a texel; those on a rim count whole, their samples lie inside.
+// True of the texels near the rim of a round layout. A close-up ball's density grows there as
+// 1 / sqrt(1 - radius), faster than a texel's mean density follows, and the rim cuts texels.
+bool near_rim(const MapLayout& layout, int x, int y) {
+  constexpr double kRings = 8;
+  if (!is_radial(layout.kind)) return false;
+  const double half = 0.5 * layout.width;
+  return std::hypot(x + 0.5 - half, y + 0.5 - half) > half - kRings;
+}
+
+// Solid angle of the part of a texel that lies on the sphere.
 double omega_of(const MapLayout& layout, const TexelDensity& density, int x, int y) {
   if (!texel_has_direction(layout, x, y)) return 0;
+  if (near_rim(layout, x, y)) return texel_solid_angle(layout, x, y);
   double omega = density(x, y);
   if (layout.convention == TexelConvention::openexr) {
     const int rows = is_cube(layout.kind) ? cube_face_size(layout) : layout.height;

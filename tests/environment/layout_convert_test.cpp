@@ -413,6 +413,13 @@ TEST(RoundTrip, TellsWhatIsLost) {
   EXPECT_NEAR(trip(make_layout(LayoutKind::hemisphere, 64)).not_covered_share, 0.5, 1e-12);
   EXPECT_NEAR(trip(make_layout(LayoutKind::cylinder, 64)).not_covered_share,
               1 - std::sin(std::atan(kPi / 2)), 1e-12);
+  // A close-up ball shows a great part of the sphere in its outermost texels.
+  for (const double distance : {1.5, 10.0}) {
+    MapLayout ball = make_layout(LayoutKind::mirror_ball, 128);
+    ball.camera_distance = distance;
+    const RoundTrip near = trip(ball);
+    EXPECT_NEAR(near.mean_after / near.mean_before, 1, 3e-3) << distance;
+  }
   // A wrong turn is a great loss: the figure can tell.
   const MapLayout square = make_layout(LayoutKind::octahedral, 256);
   const Image image = convert(map, source, square, MapFilter::adaptive, yaw_rotation(10));
