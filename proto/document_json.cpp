@@ -134,9 +134,9 @@ void write_asset(JsonWriter& writer, const AssetDocument& document) {
   writer.begin_object()
       .member("artifact", document.artifact)
       .member("extension", "EXT_lights_image_based")
-      .member("packing", "RGBD: (rgb / 255)^2.2 / (a / 255); at most 255")
-      .key("levels")
-      .begin_array();
+      .member("packing", "RGBD: (rgb / 255)^2.2 / (a / 255); at most 255");
+  write_sh_window(writer, document.sh_window);
+  writer.key("levels").begin_array();
   for (const AssetLevelDocument& level : document.levels) {
     writer.begin_object()
         .member("size", level.size)
@@ -317,6 +317,7 @@ void write_probes(JsonWriter& writer, const ProbesDocument& document) {
         .member("distance", probe.distance_artifact)
         .key("sh");
     write_sh(writer, probe.sh);
+    write_sh_window(writer, probe.sh_window);
     writer.end_object();
   }
   writer.end_array();

@@ -114,8 +114,12 @@ void write_ordered(JsonWriter& writer, const char* name, const std::optional<T>&
 
 }  // namespace
 
+void write_sh_window(JsonWriter& writer, const std::optional<ShWindowReport>& report) {
+  write_ordered(writer, "sh_window", report, write_window);
+}
+
 void write_harmonics(JsonWriter& writer, const EnvironmentDocument& document) {
-  write_ordered(writer, "sh_window", document.sh_window, write_window);
+  write_sh_window(writer, document.sh_window);
   write_ordered(writer, "zh3", document.zh3, write_zh3);
   writer.key("sh_exports").begin_array();
   for (const ShExport& sh : document.sh_exports)

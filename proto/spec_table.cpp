@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/environment/charlie_lobe.h"
+#include "proto/spec_harmonics.h"
 #include "proto/spec_layouts.h"
 
 namespace lightkiln {
@@ -60,11 +61,6 @@ ParameterGroup root_group() {
             "Random streams are a pure function of it: equal specs give equal bytes."}}};
 }
 
-constexpr Range kProbeBands{1, 33};
-constexpr Range kMapBands{1, 129};
-constexpr std::string_view kBandsMeaning =
-    "Bands of spherical harmonics; bands squared coefficients. Cost grows with their number.";
-
 KindTable ambient_occlusion_table() {
   ParameterGroup own = {
       "/parameters",
@@ -103,51 +99,6 @@ KindTable ambient_occlusion_table() {
           "Openness at every vertex of a scene: 1 = open sky.",
           {{"scene", &Spec::scene, true, false}},
           {root_group(), without(accuracy_group(), {"check_texels"}), own}};
-}
-
-ParameterGroup maps_sh_group() {
-  std::vector<std::string_view> targets;
-  for (const ShTarget target : kShTargets) targets.push_back(sh_target_name(target));
-  return {
-      "/parameters/sh",
-      {{"bands", +[](Spec& s) -> int& { return parameters<Maps>(s).sh->bands; }, kMapBands, false,
-        kBandsMeaning},
-       {"window",
-        NameMember{
-            {"none", "hann", "lanczos", "minimal"},
-            [](const Spec& s) { return static_cast<size_t>(parameters<Maps>(s).sh->window); },
-            [](Spec& s, size_t i) { parameters<Maps>(s).sh->window = ShWindow(i); }},
-        {},
-        false,
-        "Factors by band against ringing. minimal is the smallest filter 1 / (1 + lambda l^2 "
-        "(l+1)^2) whose reconstruction is nowhere negative; what it takes of energy and contrast "
-        "is stated."},
-       {"window_quantity",
-        NameMember{
-            {"radiance", "irradiance"},
-            [](const Spec& s) {
-              return static_cast<size_t>(parameters<Maps>(s).sh->window_quantity);
-            },
-            [](Spec& s, size_t i) { parameters<Maps>(s).sh->window_quantity = ShQuantity(i); }},
-        {},
-        false,
-        "The reconstruction that the window is for and is judged by. radiance asks for more. "
-        "Refused without a window."},
-       {"zh3",
-        +[](Spec& s) -> bool& { return parameters<Maps>(s).sh->zh3; },
-        {},
-        false,
-        "Linear bands with a zonal third band as well (ZH3), fitted and guessed, before any "
-        "window."},
-       {"exports",
-        NameSetMember{std::move(targets),
-                      [](Spec& s) -> uint32_t& { return parameters<Maps>(s).sh->exports; }},
-        {},
-        false,
-        "Files of the first three bands as these engines hold them, with a self-test in the "
-        "engine's axes."}},
-      [](const Spec& s) { return parameters<Maps>(s).sh.has_value(); },
-      [](Spec& s) { parameters<Maps>(s).sh.emplace(); }};
 }
 
 ParameterGroup irradiance_group() {
@@ -276,6 +227,28 @@ ParameterGroup light_set_group() {
           [](Spec& s) { parameters<Maps>(s).light_set.emplace(); }};
 }
 
+ParameterGroup asset_group() {
+  return {
+      "/parameters/asset",
+      {{"size",
+        +[](Spec& s) -> int& { return parameters<Maps>(s).asset->size; },
+        {32, 1024},
+        false,
+        "Texels along a face's side of level 0, a power of two; levels halve it down to 16."},
+       {"roughness",
+        NameMember{
+            {"linear", "babylon"},
+            [](const Spec& s) { return static_cast<size_t>(parameters<Maps>(s).asset->roughness); },
+            [](Spec& s, size_t i) { parameters<Maps>(s).asset->roughness = AssetRoughness(i); }},
+        {},
+        false,
+        "Roughness of the levels. linear: from 0 to 1 in equal steps, as the extension's text "
+        "says. babylon: what Babylon.js looks up, size^((level / (levels - 1) - 1) / 2)."},
+       asset_window_row()},
+      [](const Spec& s) { return parameters<Maps>(s).asset.has_value(); },
+      [](Spec& s) { parameters<Maps>(s).asset.emplace(); }};
+}
+
 KindTable environment_maps_table() {
   std::vector<ParameterGroup> groups = {without(root_group(), {"seed"}),
                                         without(accuracy_group(), {"max_samples", "max_seconds"}),
@@ -292,31 +265,14 @@ KindTable environment_maps_table() {
   groups.push_back(light_set_group());
   groups.push_back(
       {"/parameters/spectrum",
-       {{"bands", +[](Spec& s) -> int& { return parameters<Maps>(s).spectrum->bands; }, kMapBands,
+       {{"bands",
+         +[](Spec& s) -> int& { return parameters<Maps>(s).spectrum->bands; },
+         {1, 129},
          false,
          "Rows of the table. Advice reaches to 129 bands, whatever is listed; all cost the same."}},
        [](const Spec& s) { return parameters<Maps>(s).spectrum.has_value(); },
        [](Spec& s) { parameters<Maps>(s).spectrum.emplace(); }});
-  groups.push_back(
-      {"/parameters/asset",
-       {{"size",
-         +[](Spec& s) -> int& { return parameters<Maps>(s).asset->size; },
-         {32, 1024},
-         false,
-         "Texels along a face's side of level 0, a power of two; levels halve it down to 16."},
-        {"roughness",
-         NameMember{
-             {"linear", "babylon"},
-             [](const Spec& s) {
-               return static_cast<size_t>(parameters<Maps>(s).asset->roughness);
-             },
-             [](Spec& s, size_t i) { parameters<Maps>(s).asset->roughness = AssetRoughness(i); }},
-         {},
-         false,
-         "Roughness of the levels. linear: from 0 to 1 in equal steps, as the extension's text "
-         "says. babylon: what Babylon.js looks up, size^((level / (levels - 1) - 1) / 2)."}},
-       [](const Spec& s) { return parameters<Maps>(s).asset.has_value(); },
-       [](Spec& s) { parameters<Maps>(s).asset.emplace(); }});
+  groups.push_back(asset_group());
   for (ParameterGroup& group : layout_groups()) groups.push_back(std::move(group));
   return {Kind::environment_maps,
           "Coefficients, irradiance, prefiltered chains and the DFG table of an environment "
@@ -349,9 +305,7 @@ KindTable probes_table() {
                       {1, 512},
                       false,
                       "Texels along a face's side. Cost grows with its square."}}});
-  groups.push_back({"/parameters/sh",
-                    {{"bands", +[](Spec& s) -> int& { return parameters<Probes>(s).sh.bands; },
-                      kProbeBands, false, kBandsMeaning}}});
+  groups.push_back(probes_sh_group());
   return {Kind::probes,
           "A radiance cubemap, coefficients, a distance cube and validity at each listed position.",
           {{"scene", &Spec::scene, true, false}, {"environment", &Spec::environment, false, true}},

@@ -140,6 +140,7 @@ struct AssetLevelDocument {
 struct AssetDocument {
   std::string artifact;
   std::vector<AssetLevelDocument> levels;
+  std::optional<ShWindowReport> sh_window;  // of its coefficients, of a window other than none
 };
 // The map in another layout.
 struct LayoutDocument {
@@ -209,7 +210,8 @@ struct ProbeDocument {
   // to the job's mean luminance.
   double error = 0;
   AccuracyStatus accuracy = AccuracyStatus::converged;
-  ShDocument sh;
+  ShDocument sh;  // its error is that before the window, whose factors are at most 1
+  std::optional<ShWindowReport> sh_window;  // of a window other than none
   std::string radiance_artifact;
   std::string distance_artifact;
 };

@@ -1,6 +1,6 @@
 // A glTF asset that lights a scene by the map: EXT_lights_image_based. An output is a level of its
 // chain; its bytes are six PNG files and what packing changed, before them at level 0 the nine
-// coefficients.
+// coefficients and what a window did to them.
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +8,7 @@
 #include "core/bake/maps_cost.h"
 #include "core/bake/maps_cube.h"
 #include "core/bake/maps_sh.h"
+#include "core/bake/window_report.h"
 #include "core/base/parallel.h"
 #include "core/base/text.h"
 #include "core/environment/lookup_cube.h"
@@ -38,8 +39,8 @@ double roughness_of(AssetRoughness rule, int level, int levels, int size) {
 
 class AssetLevel : public ConvolvedCube {
  public:
-  AssetLevel(MapsLight& light, int size, int index, int levels, double roughness, double target,
-             std::shared_ptr<GltfImageLight> asset)
+  AssetLevel(MapsLight& light, int size, int index, int levels, double roughness, ShWindow window,
+             double target, std::shared_ptr<GltfImageLight> asset)
       : ConvolvedCube(light, size,
                       roughness > 0 ? std::optional(Lobe{LobeKind::ggx, roughness * roughness})
                                     : std::nullopt,
@@ -48,6 +49,7 @@ class AssetLevel : public ConvolvedCube {
         index_(index),
         levels_(levels),
         roughness_(roughness),
+        window_(window),
         asset_(std::move(asset)) {}
 
   SpectrumNeed spectrum_need() const override {
@@ -57,7 +59,8 @@ class AssetLevel : public ConvolvedCube {
   }
 
   double model_seconds(MapsLight& light) const override {
-    return ConvolvedCube::model_seconds(light) + kRgbdPerTexel * 6 * size() * size();
+    const double window = index_ == 0 && !constant() ? window_seconds(window_, kBands) : 0;
+    return ConvolvedCube::model_seconds(light) + kRgbdPerTexel * 6 * size() * size() + window;
   }
 
   std::string warning(MapsLight& light) const override {
@@ -97,6 +100,9 @@ class AssetLevel : public ConvolvedCube {
       for (Vec3d& c : asset_->irradiance_coefficients)
         for (int channel = 0; channel < 3; ++channel) c[channel] = reader.f64();
       result->document.asset.emplace();
+      if (window_ != ShWindow::none) {
+        result->document.asset->sh_window = read_window_report(window_, kQuantity, kBands, reader);
+      }
     }
     auto& faces = asset_->specular_images.emplace_back();
     for (auto& face : faces) face = reader.sized();
@@ -117,15 +123,15 @@ class AssetLevel : public ConvolvedCube {
 
  private:
   static constexpr int kBands = 3;
+  // What the coefficients are for.
+  static constexpr ShQuantity kQuantity = ShQuantity::irradiance;
 
-  static void write_coefficients(MapsLight& light, ByteWriter& writer, Progress& progress) {
-    ShRgb sh(kBands);
-    if (light.constant())
-      sh.coefficients[0] = light.environment().mean * (2 * std::sqrt(kPi));
-    else
-      sh = world_harmonics(light.spectrum(progress), kBands);
-    for (const Vec3d& c : export_sh(sh, ShTarget::ext_lights_image_based).coefficients)
+  void write_coefficients(MapsLight& light, ByteWriter& writer, Progress& progress) const {
+    const WindowedSh windowed = window_sh(radiance_coefficients(light, kBands, progress), window_,
+                                          kQuantity, light.threads(), progress);
+    for (const Vec3d& c : export_sh(windowed.sh, ShTarget::ext_lights_image_based).coefficients)
       for (int channel = 0; channel < 3; ++channel) writer.f64(c[channel]);
+    if (window_ != ShWindow::none) write_window_report(windowed.report, writer);
   }
 
   // The loss of the whole level; cutting counts by texels, whose solid angles differ by little.
@@ -151,18 +157,19 @@ class AssetLevel : public ConvolvedCube {
   ShNeed sh_need_;
   int index_, levels_;
   double roughness_;
+  ShWindow window_;
   std::shared_ptr<GltfImageLight> asset_;  // what the levels before have filed
 };
 
 void order_asset(const EnvironmentMapsParameters& parameters, MapsLight& light, double target,
                  MapsOutputs* outputs) {
-  const auto [size, rule] = *parameters.asset;
+  const auto& [size, rule, window] = *parameters.asset;
   const int levels = level_count(size);
   const auto asset = std::make_shared<GltfImageLight>();
   for (int level = 0; level < levels; ++level) {
     outputs->push_back(std::make_unique<AssetLevel>(light, size >> level, level, levels,
-                                                    roughness_of(rule, level, levels, size), target,
-                                                    asset));
+                                                    roughness_of(rule, level, levels, size), window,
+                                                    target, asset));
   }
 }
 

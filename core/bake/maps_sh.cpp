@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/bake/maps_cost.h"
+#include "core/bake/window_report.h"
 #include "core/base/parallel.h"
 #include "core/environment/brute_force.h"
 
@@ -80,20 +80,6 @@ ShRgb read_coefficients(int bands, ByteReader& reader) {
   return sh;
 }
 
-// One list of members for both directions.
-void visit_report(auto& report, const auto& visit) {
-  visit(report.lambda);
-  for (auto& factor : report.factors) visit(factor);
-  for (auto* extremes : {&report.before, &report.after}) {
-    visit(extremes->lowest);
-    visit(extremes->luminance_min);
-    visit(extremes->luminance_max);
-  }
-  visit(report.proven_lowest);
-  visit(report.energy_removed);
-  visit(report.contrast_removed);
-}
-
 class Coefficients : public MapsOutput {
  public:
   Coefficients(const ShOutput& order, const MapsLight& light, double target)
@@ -106,10 +92,7 @@ class Coefficients : public MapsOutput {
   double error_bound() const override { return bound_; }
   SpectrumNeed spectrum_need() const override { return {need_, nullptr}; }
   double model_seconds(MapsLight&) const override {
-    if (constant_ || order_.window == ShWindow::none) return 0;
-    const double searches = order_.window == ShWindow::minimal ? kWindowSearches : 6;
-    const double bands = order_.bands;
-    return searches * kPerSearch * bands * bands;
+    return constant_ ? 0 : window_seconds(order_.window, order_.bands);
   }
 
   // Bytes: the coefficients as ordered, the report of a window, the raw bands of ZH3.
@@ -121,9 +104,7 @@ class Coefficients : public MapsOutput {
     const WindowedSh windowed =
         window_sh(kept, order_.window, order_.window_quantity, light.threads(), progress);
     write_coefficients(windowed.sh, writer);
-    if (order_.window != ShWindow::none) {
-      visit_report(windowed.report, [&](double value) { writer.f64(value); });
-    }
+    if (order_.window != ShWindow::none) write_window_report(windowed.report, writer);
     if (order_.zh3) write_coefficients(raw_three(raw), writer);
     return check_coefficients(light, order_.bands, check_texels, progress);
   }
@@ -134,12 +115,8 @@ class Coefficients : public MapsOutput {
     sh.selftest = make_selftest(sh.sh);
     sh.error = error_bound();
     if (order_.window != ShWindow::none) {
-      ShWindowReport report;
-      report.window = order_.window;
-      report.quantity = order_.window_quantity;
-      report.factors.resize(static_cast<size_t>(order_.bands));
-      visit_report(report, [&](double& value) { value = reader.f64(); });
-      result->document.sh_window = std::move(report);
+      result->document.sh_window =
+          read_window_report(order_.window, order_.window_quantity, order_.bands, reader);
     }
     if (order_.zh3) result->document.zh3 = make_zh3(read_coefficients(3, reader));
     for (size_t i = 0; i < std::size(kShTargets); ++i) {

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "core/bake/probes_state.h"
+#include "core/bake/window_report.h"
 
 namespace lightkiln {
 
@@ -22,6 +23,7 @@ void write_probe(const ProbeResult& result, ByteWriter& writer) {
     writer.f64(c.y);
     writer.f64(c.z);
   }
+  if (result.window.window != ShWindow::none) write_window_report(result.window, writer);
   writer.floats(result.radiance);
   writer.floats(result.distance);
 }
@@ -47,6 +49,7 @@ void check_probe(const ProbeResult& result) {
   fence(is_length(found.distance_mean) && is_length(found.distance_min), "distances");
   fence(result.samples > 0 && is_length(result.error) && is_length(result.sh_error), "errors");
   for (const Vec3d& c : result.sh.coefficients) fence(is_finite(c), "harmonics");
+  for (const double factor : result.window.factors) fence(std::isfinite(factor), "window");
   const auto good = [](float value) { return value >= 0 && std::isfinite(value); };
   fence(std::all_of(result.radiance.begin(), result.radiance.end(), good), "radiance");
   fence(std::all_of(result.distance.begin(), result.distance.end(), good), "distance cube");
@@ -77,6 +80,9 @@ ProbeResult read_probe(ByteReader& reader, const ProbesParameters& parameters, u
     c.y = reader.f64();
     c.z = reader.f64();
   }
+  const ProbeShOutput& sh = parameters.sh;
+  if (sh.window != ShWindow::none)
+    result.window = read_window_report(sh.window, sh.window_quantity, sh.bands, reader);
   const auto size = static_cast<size_t>(parameters.cubemap.size);
   result.radiance.resize(6 * size * size * 3);
   result.distance.resize(6 * size * size);

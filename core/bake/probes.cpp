@@ -79,6 +79,13 @@ ShRgb environment_harmonics(const Environment& environment, int bands, int threa
                          bands);
 }
 
+void apply_window(const ProbeShOutput& order, int threads, ProbeResult* result) {
+  Progress quiet;
+  WindowedSh windowed = window_sh(result->sh, order.window, order.window_quantity, threads, quiet);
+  result->sh = std::move(windowed.sh);
+  result->window = std::move(windowed.report);
+}
+
 // Doubles until the error is ordered, or the samples are spent.
 ProbeResult bake_probe(ProbesState& state, const RadianceScene& scene, const CubeTexels& texels,
                        const Plan& plan, uint64_t probe, Progress& progress, double progress_begin,
@@ -128,6 +135,7 @@ ProbeResult bake_probe(ProbesState& state, const RadianceScene& scene, const Cub
     result.sh = sampling.harmonics();
     result.sh_error = static_cast<double>(static_cast<float>(sampling.harmonics_error()));
   }
+  apply_window(parameters.sh, state.grants.threads, &result);
   for (size_t i = 0; i < texels.texels.size(); ++i) {
     const Vec3 rgb = sampling.texel(i);
     result.radiance.insert(result.radiance.end(), {rgb.x, rgb.y, rgb.z});

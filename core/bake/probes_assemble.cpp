@@ -62,6 +62,7 @@ ProbeDocument describe(const ProbeResult& result, const Vec3d& position) {
   document.sh.sh = result.sh;
   document.sh.selftest = make_selftest(result.sh);
   document.sh.error = result.sh_error;
+  if (result.window.window != ShWindow::none) document.sh_window = result.window;
   document.radiance_artifact = artifact_name(result.index, "radiance");
   document.distance_artifact = artifact_name(result.index, "distance");
   return document;

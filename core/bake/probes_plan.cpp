@@ -2,9 +2,11 @@
 #include <bit>
 #include <cmath>
 
+#include "core/bake/maps_cost.h"
 #include "core/bake/probe_pilot.h"
 #include "core/bake/probe_price.h"
 #include "core/bake/probes_state.h"
+#include "core/bake/window_report.h"
 #include "core/base/parallel.h"
 
 namespace lightkiln {
@@ -49,12 +51,21 @@ uint64_t samples_within(const std::vector<ProbePilot>& pilots, double seconds, c
   return samples;
 }
 
+// What no sample changes: the windows of all probes.
+double fixed_seconds(const ProbesState& state, const Plan& plan) {
+  const ProbeShOutput& sh = state.parameters().sh;
+  if (sh.window == ShWindow::none) return 0;
+  return static_cast<double>(plan.elements) * window_seconds(sh.window, sh.bands) *
+         measure_speed() / granted_threads(state.grants.threads);
+}
+
 void price(const ProbesState& state, const std::vector<ProbePilot>& pilots, Plan* plan) {
+  const double fixed = fixed_seconds(state, *plan);
   if (const auto limit = state.spec.accuracy.max_seconds) {
-    plan->max_samples = samples_within(pilots, *limit, *plan);
+    plan->max_samples = samples_within(pilots, *limit - fixed, *plan);
     plan->min_samples = std::min(plan->min_samples, plan->max_samples);
     const uint64_t least = plan->min_samples;
-    if (forecast(pilots, plan->elements, 0, least, least).seconds.value > *limit) {
+    if (fixed + forecast(pilots, plan->elements, 0, least, least).seconds.value > *limit) {
       plan->warnings.push_back("Even " + std::to_string(least) +
                                " samples a texel, the fewest, may take longer than max_seconds "
                                "allows.");
@@ -62,15 +73,15 @@ void price(const ProbesState& state, const std::vector<ProbePilot>& pilots, Plan
   }
   const Forecast order = forecast(pilots, plan->elements, noise_target(state, *plan),
                                   plan->min_samples, plan->max_samples);
-  plan->predicted_s = order.seconds.value;
-  plan->predicted_low_s = order.seconds.low;
-  plan->predicted_high_s = order.seconds.high;
+  plan->predicted_s = fixed + order.seconds.value;
+  plan->predicted_low_s = fixed + order.seconds.low;
+  plan->predicted_high_s = fixed + order.seconds.high;
   for (const double error : kQuotedErrors) {
     // No limit of samples: a price says what the error needs.
     const Forecast quoted =
         forecast(pilots, plan->elements, error, plan->min_samples, uint64_t{1} << 40);
     plan->prices.push_back({error, static_cast<uint64_t>(std::ceil(quoted.samples)),
-                            quoted.seconds.value, quoted.extrapolated});
+                            fixed + quoted.seconds.value, quoted.extrapolated});
   }
 }
 

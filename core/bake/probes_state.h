@@ -52,8 +52,9 @@ struct ProbeResult {
   AccuracyStatus accuracy = AccuracyStatus::converged;
   uint64_t samples = 0;  // a texel
   double error = 0;      // see ProbeDocument
-  ShRgb sh;
+  ShRgb sh;              // windowed as ordered
   double sh_error = 0;
+  ShWindowReport window;
   std::vector<float> radiance;  // stacked cube, RGB
   std::vector<float> distance;  // stacked cube, world units, 0 = nothing hit
 };

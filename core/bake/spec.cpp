@@ -155,11 +155,16 @@ void check_ambient_occlusion(const AmbientOcclusionParameters& p, Checker& check
                   "falloff_distance belongs to the falloff exponential only.");
 }
 
-void check_sh(const ShOutput& sh, Checker& checker) {
-  checker.between(sh.bands, 1, 129, "/parameters/sh/bands", "bands");
-  if (sh.window == ShWindow::none && sh.window_quantity != ShQuantity::irradiance)
+// Of maps and of probes.
+void check_window(ShWindow window, ShQuantity quantity, Checker& checker) {
+  if (window == ShWindow::none && quantity != ShQuantity::irradiance)
     checker.fault("/parameters/sh/window_quantity", "conflict",
                   "window_quantity says what a window is for; it needs a window other than none.");
+}
+
+void check_sh(const ShOutput& sh, Checker& checker) {
+  checker.between(sh.bands, 1, 129, "/parameters/sh/bands", "bands");
+  check_window(sh.window, sh.window_quantity, checker);
   if (sh.exports >> std::size(kShTargets) != 0)
     checker.fault("/parameters/sh/exports", "range", "exports names an engine that is not known.");
 }
@@ -364,6 +369,7 @@ void check_probes(const ProbesParameters& p, Checker& checker) {
   }
   checker.between(p.cubemap.size, 1, 512, "/parameters/cubemap/size", "size");
   checker.between(p.sh.bands, 1, 33, "/parameters/sh/bands", "bands");
+  check_window(p.sh.window, p.sh.window_quantity, checker);
   const bool sized = p.cubemap.size >= 1 && p.cubemap.size <= 512 && p.sh.bands >= 1;
   if (sized && p.sh.bands <= 33 && p.positions.size() <= kMostPositions)
     check_probe_bytes(p, checker);

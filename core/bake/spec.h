@@ -97,6 +97,8 @@ struct AssetOutput {
   // file grow with size^2.
   int size = 256;
   AssetRoughness roughness = AssetRoughness::linear;
+  // Of the nine coefficients, for irradiance, which is all that they give; as of ShOutput.
+  ShWindow window = ShWindow::none;
 };
 // Takes the brightest compact source out of the map, so that every other output is of the rest.
 struct SunOrder {
@@ -135,6 +137,9 @@ struct CubemapOutput {
 
 struct ProbeShOutput {
   int bands = 3;  // 1..33; cost grows with bands^2
+  // As of ShOutput; `minimal` takes up to a tenth of a second a probe at 33 bands.
+  ShWindow window = ShWindow::none;
+  ShQuantity window_quantity = ShQuantity::irradiance;
 };
 
 struct ProbesParameters {

@@ -165,6 +165,86 @@ TEST(MapsAsset, WarnsOfWhatTheFormatCannotHold) {
   EXPECT_EQ(document_of(quiet).levels[0].cut_texels, 0u);
 }
 
+// The JSON of a GLB.
+std::string json_of(const Assembly& assembly) {
+  const auto& glb = bytes_of(assembly, "environment.glb");
+  uint32_t length = 0;
+  std::memcpy(&length, &glb[12], 4);
+  return {reinterpret_cast<const char*>(&glb[20]), length};
+}
+
+// The nine coefficients that viewers read.
+std::vector<Vec3d> coefficients_of(const Assembly& assembly) {
+  const std::string json = json_of(assembly), key = "\"irradianceCoefficients\":[";
+  const char* at = json.c_str() + json.find(key) + key.size();
+  std::vector<Vec3d> all(9);
+  for (Vec3d& c : all) {
+    for (int channel = 0; channel < 3; ++channel) {
+      char* end = nullptr;
+      c[channel] = std::strtod(at + 1, &end);  // past [ or ,
+      at = end;
+    }
+    at += 2;  // past ],
+  }
+  return all;
+}
+
+TEST(MapsAsset, WindowsItsCoefficientsAsThoseOfTheMap) {
+  const Image sky = reference::test_sky(32, 1e5);
+  EnvironmentMapsParameters parameters;
+  parameters.asset = AssetOutput{32, AssetRoughness::linear};
+  const std::vector<Vec3d> plain = coefficients_of(bake(sky, parameters));
+  EXPECT_FALSE(document_of(bake(sky, parameters)).sh_window);
+  for (const ShWindow window : {ShWindow::hann, ShWindow::lanczos, ShWindow::minimal}) {
+    parameters.asset->window = window;
+    parameters.sh = ShOutput{3, window};
+    parameters.sh->exports = 1u << static_cast<int>(ShTarget::ext_lights_image_based);
+    const Assembly result = bake(sky, parameters);
+    const auto& document = std::get<EnvironmentDocument>(result.document);
+    ASSERT_TRUE(document.asset->sh_window);
+    const ShWindowReport &own = *document.asset->sh_window, &sh = *document.sh_window;
+    EXPECT_EQ(own.window, window);
+    EXPECT_EQ(own.quantity, ShQuantity::irradiance);
+    EXPECT_EQ(own.factors, sh.factors);
+    EXPECT_EQ(own.energy_removed, sh.energy_removed);
+    EXPECT_EQ(own.contrast_removed, sh.contrast_removed);
+    EXPECT_EQ(own.before.lowest, sh.before.lowest);
+    EXPECT_EQ(own.after.lowest, sh.after.lowest);
+    EXPECT_LT(own.before.lowest, -0.01);  // a sun in three bands leaves negative light
+    if (window == ShWindow::minimal) {
+      EXPECT_GE(own.after.lowest, -2e-6);
+    }
+    const std::vector<Vec3d> windowed = coefficients_of(result);
+    for (size_t i = 0; i < 9; ++i) {
+      const size_t band = i == 0 ? 0 : i < 4 ? 1 : 2;
+      const double scale = length(plain[0]);
+      EXPECT_LT(length(windowed[i] - plain[i] * own.factors[band]), 1e-12 * scale) << i;
+      EXPECT_LT(length(windowed[i] - document.sh_exports.at(0).coefficients[i]), 1e-12 * scale);
+    }
+    EXPECT_EQ(windowed[0], plain[0]);
+  }
+}
+
+// Its images are the same: a window is of the coefficients.
+TEST(MapsAsset, AWindowLeavesItsImagesAloneAndAConstantMapWhole) {
+  EnvironmentMapsParameters plain, windowed;
+  plain.asset = AssetOutput{32};
+  windowed.asset = AssetOutput{32, AssetRoughness::linear, ShWindow::minimal};
+  const Image sky = directions(16);
+  const auto images = [&](const EnvironmentMapsParameters& parameters) {
+    std::vector<std::vector<uint8_t>> all;
+    for (const Image8& image : images_of(bytes_of(bake(sky, parameters), "environment.glb")))
+      all.push_back(image.pixels);
+    return all;
+  };
+  EXPECT_EQ(images(plain), images(windowed));
+  Image map(8, 4, 3);
+  std::fill(map.pixels.begin(), map.pixels.end(), 1.0f);
+  const Assembly result = bake(map, windowed);
+  EXPECT_EQ(bytes_of(result, "environment.glb"), bytes_of(bake(map, plain), "environment.glb"));
+  EXPECT_EQ(document_of(result).sh_window->contrast_removed, 0);
+}
+
 TEST(MapsAsset, OfAWhiteFurnaceIsOneEverywhere) {
   Image map(8, 4, 3);
   std::fill(map.pixels.begin(), map.pixels.end(), 1.0f);
@@ -175,10 +255,7 @@ TEST(MapsAsset, OfAWhiteFurnaceIsOneEverywhere) {
   for (const Image8& image : images_of(glb))
     for (const uint8_t value : image.pixels) ASSERT_EQ(value, 255);
   // Irradiance pi: pi 2 sqrt(pi) = 11.136656 at 00, nothing above.
-  uint32_t length = 0;
-  std::memcpy(&length, &glb[12], 4);
-  const std::string json(reinterpret_cast<const char*>(&glb[20]), length);
-  EXPECT_NE(json.find("\"irradianceCoefficients\":[[11.13665599"), std::string::npos);
+  EXPECT_NE(json_of(result).find("\"irradianceCoefficients\":[[11.13665599"), std::string::npos);
   EXPECT_EQ(document_of(result).levels.size(), 5u);  // 256 128 64 32 16
   EXPECT_EQ(document_of(result).levels[4].roughness, 1);
 }

@@ -5,6 +5,7 @@
 
 #include "proto/json.h"
 #include "proto/json_value.h"
+#include "proto/json_writer.h"
 #include "proto/messages.h"
 #include "proto/problem.h"
 #include "proto/spec_table.h"
@@ -179,6 +180,43 @@ TEST(DocumentJson, SaysOfEveryCubeHowItsFacesAreTurned) {
   EXPECT_EQ(theirs.find("dfg")->find("face_orientation"), nullptr);
   EXPECT_NE(theirs.find("convention")->find("cube")->string()->find("(-x, y, z)"),
             std::string::npos);
+}
+
+TEST(DocumentJson, SaysOfEveryWindowTheSame) {
+  ShWindowReport report;
+  report.window = ShWindow::minimal;
+  report.lambda = 0.25;
+  report.factors = {1, 0.5};
+  report.energy_removed = 0.125;
+  report.contrast_removed = 0.0625;
+  const auto written = [](auto document, const Spec& spec) {
+    Assembly assembly;
+    assembly.document = document;
+    return read_trusted_json(write_document(assembly, spec, Plan{}), ErrorCode::internal, "x");
+  };
+  Spec maps;
+  maps.environment = InputRef{sha256_digest("x", 1), {}};
+  maps.parameters = EnvironmentMapsParameters{};
+  EnvironmentDocument environment;
+  environment.sh_window = report;
+  environment.asset.emplace().sh_window = report;
+  const JsonValue map = written(environment, maps);
+  ProbesDocument probes;
+  probes.probes.emplace_back().sh_window = report;
+  probes.probes.emplace_back();
+  const JsonValue probe = written(probes, empty_spec(Kind::probes));
+  const JsonValue::Array& items = *probe.find("probes")->array();
+  const auto text = [](const JsonValue* value) {
+    JsonWriter writer;
+    writer.value(*value, true);
+    return writer.take();
+  };
+  const std::string stated = text(map.find("sh_window"));
+  EXPECT_NE(stated.find("\"energy_removed\":0.125"), std::string::npos);
+  EXPECT_NE(stated.find("\"contrast_removed\":0.0625"), std::string::npos);
+  EXPECT_EQ(text(map.find("asset")->find("sh_window")), stated);
+  EXPECT_EQ(text(items.at(0).find("sh_window")), stated);
+  EXPECT_TRUE(items.at(1).find("sh_window")->is_null());
 }
 
 TEST(DocumentJson, CountsTheVerticesThatFellShort) {

@@ -177,6 +177,36 @@ TEST(SpecJson, TakesHowCubesAreWritten) {
   EXPECT_EQ(told(R"("irradiance":{},"cubes":"opengl")"), Told{"/parameters/cubes type"});
 }
 
+TEST(SpecJson, TakesTheSameWindowsForProbesAndAssets) {
+  const auto probes = [](const std::string& sh) {
+    return R"({"kind":"probes","inputs":{"scene":)" + kA +
+           R"(},"parameters":{"positions":[[0,0,0]],"sh":{)" + sh + "}}}";
+  };
+  const auto asset = [](const std::string& members) {
+    return R"({"kind":"environment_maps","inputs":{"environment":)" + kA +
+           R"(},"parameters":{"asset":{)" + members + "}}}";
+  };
+  const auto windowed = parse_spec(probes(R"("window":"lanczos","window_quantity":"radiance")"));
+  ASSERT_TRUE(windowed.faults.empty()) << windowed.faults[0].message;
+  const auto& sh = std::get<ProbesParameters>(windowed.spec.parameters).sh;
+  EXPECT_EQ(sh.window, ShWindow::lanczos);
+  EXPECT_EQ(sh.window_quantity, ShQuantity::radiance);
+  const auto light = parse_spec(asset(R"("window":"minimal")"));
+  ASSERT_TRUE(light.faults.empty()) << light.faults[0].message;
+  EXPECT_EQ(std::get<EnvironmentMapsParameters>(light.spec.parameters).asset->window,
+            ShWindow::minimal);
+  for (const Spec& spec : {windowed.spec, light.spec}) {
+    const std::string canonical = canonical_spec(spec);
+    EXPECT_EQ(canonical_spec(parse_spec(canonical).spec), canonical);
+  }
+  EXPECT_EQ(faults_of(probes(R"("window_quantity":"radiance")")),
+            Told{"/parameters/sh/window_quantity conflict"});
+  EXPECT_EQ(faults_of(probes(R"("window":"hamming")")), Told{"/parameters/sh/window range"});
+  EXPECT_EQ(faults_of(asset(R"("window":true)")), Told{"/parameters/asset/window type"});
+  EXPECT_EQ(faults_of(asset(R"("window_quantity":"radiance")")),
+            Told{"/parameters/asset/window_quantity unknown"});
+}
+
 TEST(SpecCanonical, IsStableUnderOrderSpaceAndDefaults) {
   const std::string plain = ao("");
   const std::string spelled =
@@ -296,6 +326,8 @@ Spec random_spec() {
     if (*rc::gen::arbitrary<bool>())
       maps->irradiance = IrradianceOutput{.method = IrradianceMethod::harmonics,
                                           .bands = *rc::gen::inRange(1, 34)};
+    if (*rc::gen::arbitrary<bool>())
+      maps->asset = AssetOutput{.window = ShWindow(*rc::gen::inRange(0, 4))};
     if (maps->irradiance || maps->sheen)
       maps->cubes.face_orientation = FaceOrientation(*rc::gen::inRange(0, 2));
   } else {
@@ -304,6 +336,7 @@ Spec random_spec() {
     for (int i = 0; i < count; ++i)
       probes.positions.push_back({positive(), -positive(), positive()});
     if (*rc::gen::arbitrary<bool>()) probes.max_bounces = *rc::gen::inRange(0, 65);
+    probes.sh.window = ShWindow(*rc::gen::inRange(0, 4));
   }
   return spec;
 }
