@@ -54,8 +54,9 @@ void write_measured(JsonWriter& writer, const MeasuredError& measured) {
       .begin_object()
       .member("count", measured.count)
       .member("rms", measured.rms)
-      .member("max", measured.max)
-      .end_object();
+      .member("max", measured.max);
+  if (measured.twin > 0) writer.member("twin_error", measured.twin);
+  writer.end_object();
 }
 
 namespace {

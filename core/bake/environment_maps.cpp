@@ -273,12 +273,13 @@ class OutputProgress {
   Progress part;
 };
 
-constexpr size_t kMeasuredBytes = 24;
+constexpr size_t kMeasuredBytes = 32;
 
 void write_measured(const MeasuredError& measured, ByteWriter& writer) {
   writer.u64(measured.count);
   writer.f64(measured.rms);
   writer.f64(measured.max);
+  writer.f64(measured.twin);
 }
 
 // What stands at the end of a chunk of `count` outputs.
@@ -291,6 +292,7 @@ std::vector<MeasuredError> read_measured(std::span<const std::byte> chunk, size_
     measured.count = reader.u64();
     measured.rms = reader.f64();
     measured.max = reader.f64();
+    measured.twin = reader.f64();
   }
   return all;
 }

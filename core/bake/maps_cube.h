@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/bake/maps_output.h"
+#include "core/environment/lobe_averages.h"
 
 namespace lightkiln {
 
@@ -18,7 +19,7 @@ struct CheckedTexels {
   // Of the texels' middles.
   std::vector<Vec3d> directions() const;
   // Against `truths` times `factor`, relative to `scale`.
-  MeasuredError compare(const Image& cube, std::span<const Vec3d> truths, double factor,
+  MeasuredError compare(const Image& cube, const LobeAverages& truths, double factor,
                         double scale) const;
 
   int face_size;

@@ -89,7 +89,7 @@ void judge_output(double bound, const MeasuredError& measured, double target, Ch
   round->error_max = std::max({round->error_max, bound, measured.max});
   if (bound > target)
     ++report->budget_limited;
-  else if (measured.max > target)
+  else if (measured.max - measured.twin > target)
     ++report->suspicious;
   else
     ++round->converged;

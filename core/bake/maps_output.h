@@ -91,10 +91,12 @@ double ordered_error(double working_target);
 // the golden ratio.
 size_t check_index(int i, size_t all);
 
-// Differences relative to `scale`, gathered one by one.
+// Differences relative to `scale`, gathered one by one, from truths that err by `twin` at most.
 class ErrorMeter {
  public:
-  explicit ErrorMeter(double scale) : scale_(scale) {}
+  explicit ErrorMeter(double scale, double twin = 0) : scale_(scale) {
+    measured_.twin = scale > 0 ? twin / scale : twin;
+  }
   void add(const Vec3d& value, const Vec3d& truth);
   MeasuredError result() const;
 
@@ -105,7 +107,8 @@ class ErrorMeter {
 };
 
 // Enters an output into the books. It counts with the larger of what was promised and what was
-// seen; one whose texels err by more than the order, against what its bound says, is suspicious.
+// seen; one whose texels err by more than the order, against what its bound says and beyond what
+// the twin may err by, is suspicious.
 void judge_output(double bound, const MeasuredError& measured, double target, ChunkReport* report,
                   Round* round);
 

@@ -1,107 +1,15 @@
 #include "core/environment/brute_force.h"
 
+#include <algorithm>
 #include <array>
-#include <cstring>
+#include <cmath>
+#include <vector>
 
-#include "core/base/instruction_sets.h"
 #include "core/sphere/direction_map.h"
 #include "core/sphere/quadrature.h"
 #include "core/sphere/solid_angle.h"
 
 namespace lightkiln {
-
-namespace brute_force {
-
-Row read_row(const Environment& environment, int y) {
-  constexpr double kBright = 20;
-  const Image& map = environment.radiance;
-  const size_t width = static_cast<size_t>(map.width);
-  const double bright_above = kBright * luminance(environment.mean);
-  Row row;
-  row.colatitude_rad = (y + 0.5) * kPi / map.height;
-  row.omega = latlong_texel_solid_angle(y, map.width, map.height);
-  row.red.resize(width);
-  row.green.resize(width);
-  row.blue.resize(width);
-  row.bright.resize(width);
-  for (size_t x = 0; x < width; ++x) {
-    const Vec3d value = to_double(map.rgb(static_cast<int>(x), y));
-    row.red[x] = value.x;
-    row.green[x] = value.y;
-    row.blue[x] = value.z;
-    row.bright[x] = luminance(value) > bright_above;
-  }
-  return row;
-}
-
-Columns::Columns(int width) : sine(static_cast<size_t>(width)), cosine(sine.size()) {
-  for (size_t x = 0; x < sine.size(); ++x) {
-    const double phi = kPi - (static_cast<double>(x) + 0.5) * (2 * kPi / width);
-    sine[x] = std::sin(phi);
-    cosine[x] = std::cos(phi);
-  }
-}
-
-LIGHTKILN_CLONES void fill_cosines(const Columns& columns, const Vec3d& axis, double colatitude_rad,
-                                   std::span<double> cosines) {
-  const double along = axis.y * std::cos(colatitude_rad), ring = std::sin(colatitude_rad);
-  const double *sine = columns.sine.data(), *cosine = columns.cosine.data();
-  double* out = cosines.data();
-  const size_t count = cosines.size();
-  for (size_t x = 0; x < count; ++x) {
-    const double c = along + ring * (axis.x * sine[x] + axis.z * cosine[x]);
-    const double most = c < 1 ? c : 1;
-    out[x] = most > -1 ? most : -1;
-  }
-}
-
-namespace {
-
-// 1 where the texel is an exception.
-LIGHTKILN_CLONES void mark(const double* cosines, const uint8_t* bright, double side, double near,
-                           uint8_t* marks, size_t count) {
-  for (size_t x = 0; x < count; ++x) {
-    const double c = cosines[x];
-    marks[x] = static_cast<uint8_t>((std::abs(c) < side) | (c > near) | bright[x]);
-  }
-}
-
-}  // namespace
-
-void find_exceptions(const Row& row, std::span<const double> cosines, double side, double near,
-                     std::vector<size_t>* columns) {
-  constexpr size_t kAtOnce = 64;
-  columns->clear();
-  for (size_t begin = 0; begin < cosines.size(); begin += kAtOnce) {
-    const size_t count = std::min(kAtOnce, cosines.size() - begin);
-    uint8_t marks[kAtOnce];
-    mark(&cosines[begin], &row.bright[begin], side, near, marks, count);
-    for (const uint8_t* at = marks; at < marks + count; ++at) {
-      at = static_cast<const uint8_t*>(std::memchr(at, 1, static_cast<size_t>(marks + count - at)));
-      if (at == nullptr) break;
-      columns->push_back(begin + static_cast<size_t>(at - marks));
-    }
-  }
-}
-
-// Eight partial sums of each colour, whatever the machine's vectors hold.
-LIGHTKILN_CLONES Vec3d weighted_sum(const Row& row, std::span<const double> weights) {
-  constexpr size_t kLanes = 8;
-  double sums[3][kLanes] = {};
-  const double* colors[3] = {row.red.data(), row.green.data(), row.blue.data()};
-  const size_t count = weights.size(), whole = count - count % kLanes;
-  for (int c = 0; c < 3; ++c) {
-    for (size_t x = 0; x < whole; x += kLanes) {
-      for (size_t k = 0; k < kLanes; ++k) sums[c][k] += weights[x + k] * colors[c][x + k];
-    }
-    for (size_t x = whole; x < count; ++x) sums[c][0] += weights[x] * colors[c][x];
-  }
-  Vec3d total;
-  for (size_t k = 0; k < kLanes; ++k) total += Vec3d{sums[0][k], sums[1][k], sums[2][k]};
-  return total;
-}
-
-}  // namespace brute_force
 
 // A texel is a box: along its row cos(m phi) integrates to (2/m) sin(m s/2) cos(m phi_centre), and
 // across it Gauss points of P_lm sin(theta) are exact to the last digit when there are eight, and

@@ -25,10 +25,6 @@ double CharlieLobe::operator()(double cosine) const {
   return scale_ * cosine * std::pow(std::max(0.0, 1 - cosine), power_);
 }
 
-void CharlieLobe::fill(std::span<const double> cosines, std::span<double> values) const {
-  std::transform(cosines.begin(), cosines.end(), values.begin(), *this);
-}
-
 double CharlieLobe::at_angle(double angle_rad) const {
   if (angle_rad >= kPi / 2) return 0;
   const double s = std::sin(angle_rad / 2);

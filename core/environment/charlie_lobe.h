@@ -2,8 +2,6 @@
 
 // The "Charlie" sheen lobe of Estevez & Kulla with normal, view and mirror direction in one.
 
-#include <span>
-
 #include "core/environment/lobe.h"
 
 namespace lightkiln {
@@ -16,11 +14,13 @@ class CharlieLobe final : public ZonalKernel {
   explicit CharlieLobe(double alpha);
 
   double operator()(double cosine) const;
-  // The same for each of `cosines`.
-  void fill(std::span<const double> cosines, std::span<double> values) const;
   double at_angle(double angle_rad) const override;
   double panel(double angle_rad) const override;
   double horizon_slope() const override { return scale_; }
+
+  // The lobe at 1 - cosine = x is scale() (1 - x) x^power().
+  double power() const { return power_; }
+  double scale() const { return scale_; }
 
  private:
   double power_, scale_;

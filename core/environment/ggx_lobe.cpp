@@ -7,7 +7,6 @@
 #include <cassert>
 #include <cmath>
 
-#include "core/base/instruction_sets.h"
 #include "core/base/math.h"
 
 namespace lightkiln {
@@ -32,23 +31,6 @@ GgxLobe::GgxLobe(double alpha) : alpha_(alpha) {
     integral = (x - std::log1p(x)) / (broad_ * broad_);
   }
   scale_ = 1 / (2 * kPi * integral);
-}
-
-namespace {
-
-LIGHTKILN_CLONES void fill_values(const GgxLobe& lobe, std::span<const double> cosines,
-                                  std::span<double> values) {
-  const GgxLobe local = lobe;  // whose numbers no store below can change
-  const double* from = cosines.data();
-  double* to = values.data();
-  const size_t count = values.size();
-  for (size_t i = 0; i < count; ++i) to[i] = local(from[i]);
-}
-
-}  // namespace
-
-void GgxLobe::fill(std::span<const double> cosines, std::span<double> values) const {
-  fill_values(*this, cosines, values);
 }
 
 double GgxLobe::at_angle(double angle_rad) const {

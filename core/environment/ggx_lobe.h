@@ -3,7 +3,6 @@
 // The GGX reflection lobe with normal, view and mirror direction in one (n = v = r), which makes
 // prefiltering a convolution with a kernel of the angle to r alone.
 
-#include <span>
 #include <vector>
 
 #include "core/environment/lobe.h"
@@ -23,8 +22,6 @@ class GgxLobe final : public ZonalKernel {
     const double value = scale_ * cosine / (d * d);
     return cosine > 0 ? value : 0;
   }
-  // The same for each of `cosines`, with the same bits.
-  void fill(std::span<const double> cosines, std::span<double> values) const;
   // The same from the angle, exact for narrow lobes, where the cosine has lost its digits.
   double at_angle(double angle_rad) const override;
   double panel(double angle_rad) const override;

@@ -2,7 +2,7 @@
 
 // Maps and levels for tests of convolution.
 
-#include "core/environment/brute_force.h"
+#include "core/environment/lobe_averages.h"
 #include "core/environment/prefilter.h"
 #include "core/image/decode.h"
 
@@ -32,11 +32,9 @@ inline Level convolve(const Environment& environment, const Lobe& lobe, int size
 }
 
 // The slow twin at one direction.
-template <typename SlowLobe>
-Vec3d slow_average(const Environment& environment, const SlowLobe& lobe, const LobeWidths& widths,
-                   const Vec3d& axis) {
+inline Vec3d slow_average(const Environment& environment, const Lobe& lobe, const Vec3d& axis) {
   Progress progress;
-  return lobe_averages(environment, lobe, widths, {&axis, 1}, 1, progress)[0];
+  return lobe_averages(environment, *make_twin_lobe(lobe), {&axis, 1}, 1, progress).means[0];
 }
 
 // Every texel of a map cut into factor x factor equal ones.
