@@ -18,28 +18,30 @@ double mean_pitch(const MapLayout& layout) {
 // What is kept of the order for everything else that errs.
 constexpr double kSpare = 0.5;
 
-// The range of values over a rectangle of the source, and the brightest of them.
-struct ValueRange {
-  float low[3] = {1e38f, 1e38f, 1e38f}, high[3] = {0, 0, 0};
+// About a pole a few texels are the whole turn.
+bool by_pole(const ConversionTask& task, double y) {
+  return task.turn > 0 && (y < task.reach || y > task.source.layout.height - task.reach);
+}
 
-  void add(const float* value) {
-    for (int c = 0; c < 3; ++c) {
-      low[c] = std::min(low[c], value[c]);
-      high[c] = std::max(high[c], value[c]);
-    }
-  }
-  double brightest() const { return double(std::max({high[0], high[1], high[2]})); }
-  double spread() const {
-    double spread = 0;
-    for (int c = 0; c < 3; ++c) spread = std::max(spread, double(high[c]) - double(low[c]));
-    return spread;
-  }
-};
+void show(const ConversionTask& task, const Vec3d& direction, CellCorner* corner) {
+  corner->shown = true;
+  const std::optional<MapPlace> place =
+      layout_place(task.source.layout, task.turned ? task.rotation.undo(direction) : direction);
+  if (!place) return;
+  corner->covered = true;
+  corner->place = *place;
+}
 
-double smaller_extent(double ax, double ay, double bx, double by) {
-  const double trace = ax * ax + ay * ay + bx * bx + by * by, area = ax * by - ay * bx;
-  const double root = std::sqrt(std::max(0.0, trace * trace - 4 * area * area));
-  return std::sqrt(std::max(0.0, (trace - root) / 2));
+double distance(const GridPoint& a, const GridPoint& b) {
+  return std::sqrt((a.x - b.x) * (a.x - b.x) + (a.y - b.y) * (a.y - b.y));
+}
+
+// The mean of opposite sides.
+GridPoint first_side(const std::array<GridPoint, 4>& p) {
+  return {0.5 * (p[1].x - p[0].x + p[2].x - p[3].x), 0.5 * (p[1].y - p[0].y + p[2].y - p[3].y)};
+}
+GridPoint second_side(const std::array<GridPoint, 4>& p) {
+  return {0.5 * (p[3].x - p[0].x + p[2].x - p[1].x), 0.5 * (p[3].y - p[0].y + p[2].y - p[1].y)};
 }
 
 }  // namespace
@@ -66,12 +68,16 @@ CellCorner locate(const ConversionTask& task, double x, double y) {
   CellCorner corner;
   const std::optional<Vec3d> direction = layout_direction(task.to, x, y);
   if (!direction) return corner;
-  corner.shown = true;
-  const std::optional<MapPlace> place =
-      layout_place(task.source.layout, task.turned ? task.rotation.undo(*direction) : *direction);
-  if (!place) return corner;
-  corner.covered = true;
-  corner.place = *place;
+  corner.at = {x, y};
+  show(task, *direction, &corner);
+  return corner;
+}
+
+CellCorner locate(const ConversionTask& task, const RimPatch& patch, double a, double b) {
+  const RimPoint point = rim_point(task.to, patch, a, b);
+  CellCorner corner;
+  corner.at = {point.x, point.y};
+  show(task, point.direction, &corner);
   return corner;
 }
 
@@ -100,9 +106,39 @@ TargetCell texel_cell(const MapLayout& layout, const TargetBlock& block, int x, 
           grid_line(layout, y + 1, block.y, block.rows), corners};
 }
 
-double CellOutline::smaller_at(size_t i) const {
-  const GridPoint &p = points[i], &next = points[(i + 1) % 4], &last = points[(i + 3) % 4];
-  return smaller_extent(next.x - p.x, next.y - p.y, last.x - p.x, last.y - p.y);
+// With sides P, Q in the target and A, B in the source, J (P Q) = (A B) gives the columns of J as
+//   dq/dx = (A Q_y - B P_y) / d,  dq/dy = (B P_x - A Q_x) / d,  d = P_x Q_y - P_y Q_x.
+// Its singular values' squares are the roots of z^2 - trace z + det^2; the smaller is |det| over
+// the larger, without cancellation.
+double smaller_span(GridPoint p, GridPoint q, GridPoint a, GridPoint b) {
+  const double d = p.x * q.y - p.y * q.x;
+  if (d == 0) return 0;
+  const double xx = (a.x * q.y - b.x * p.y) / d, xy = (a.y * q.y - b.y * p.y) / d;
+  const double yx = (b.x * p.x - a.x * q.x) / d, yy = (b.y * p.x - a.y * q.x) / d;
+  const double trace = xx * xx + xy * xy + yx * yx + yy * yy, det = xx * yy - xy * yx;
+  const double larger = 0.5 * (trace + std::sqrt(std::max(0.0, trace * trace - 4 * det * det)));
+  return larger > 0 ? std::abs(det) / std::sqrt(larger) : 0;
+}
+
+double CellOutline::span_at(size_t i) const {
+  const auto side = [&](const std::array<GridPoint, 4>& corners, size_t to) {
+    return GridPoint{corners[to % 4].x - corners[i].x, corners[to % 4].y - corners[i].y};
+  };
+  return smaller_span(side(target, i + 1), side(target, i + 3), side(points, i + 1),
+                      side(points, i + 3));
+}
+
+double CellOutline::first_length() const {
+  return std::max(distance(points[0], points[1]), distance(points[3], points[2]));
+}
+double CellOutline::second_length() const {
+  return std::max(distance(points[0], points[3]), distance(points[1], points[2]));
+}
+
+bool CellOutline::slender() const {
+  constexpr double kSlender = 0.2;
+  const double longest = std::max(first_length(), second_length());
+  return area < kSlender * longest * longest;
 }
 
 std::optional<CellOutline> outline_of(const ConversionTask& task,
@@ -117,28 +153,45 @@ std::optional<CellOutline> outline_of(const ConversionTask& task,
       found.chart = place.chart;
     }
     p[i] = {place.x, place.y};
+    found.target[i] = corners[i].at;
     if (task.turn > 0 && i > 0) {
       p[i].x -= task.turn * std::nearbyint((place.x - p[0].x) / task.turn);
     }
   }
   for (size_t i = 0; i < 4; ++i) {
     const GridPoint &a = p[i], &b = p[(i + 1) % 4];
-    if (std::abs(a.x - b.x) > task.span_x || std::abs(a.y - b.y) > task.span_y) return std::nullopt;
+    const bool wide_x = std::abs(a.x - b.x) > task.span_x;
+    if (wide_x && (by_pole(task, a.y) || by_pole(task, b.y))) return std::nullopt;
+    found.wide = found.wide || wide_x || std::abs(a.y - b.y) > task.span_y;
   }
-  found.ax = 0.5 * (p[1].x - p[0].x + p[2].x - p[3].x);
-  found.ay = 0.5 * (p[1].y - p[0].y + p[2].y - p[3].y);
-  found.bx = 0.5 * (p[3].x - p[0].x + p[2].x - p[1].x);
-  found.by = 0.5 * (p[3].y - p[0].y + p[2].y - p[1].y);
-  found.area = std::abs(found.ax * found.by - found.ay * found.bx);
-  found.smaller = smaller_extent(found.ax, found.ay, found.bx, found.by);
+  const GridPoint a = first_side(p), b = second_side(p);
+  found.ax = a.x;
+  found.ay = a.y;
+  found.bx = b.x;
+  found.by = b.y;
+  found.area = std::abs(a.x * b.y - a.y * b.x);
+  found.span = smaller_span(first_side(found.target), second_side(found.target), a, b);
   return found;
+}
+
+void ValueRange::add(const float* value) {
+  for (int c = 0; c < 3; ++c) {
+    low[c] = std::min(low[c], value[c]);
+    high[c] = std::max(high[c], value[c]);
+  }
+}
+
+double ValueRange::spread() const {
+  double spread = 0;
+  for (int c = 0; c < 3; ++c) spread = std::max(spread, double(high[c]) - double(low[c]));
+  return spread;
 }
 
 namespace {
 
 // The values of a rectangle of the source, which may lie across the seam.
-void add_values(const ConversionTask& task, double low_x, double low_y, double high_x,
-                double high_y, ValueRange* range) {
+void add_box(const ConversionTask& task, double low_x, double low_y, double high_x, double high_y,
+             ValueRange* range) {
   const MapLayout& from = task.source.layout;
   const int top = std::max(0, static_cast<int>(low_y));
   const int bottom = std::min(from.height - 1, static_cast<int>(high_y));
@@ -160,30 +213,30 @@ void add_values(const ConversionTask& task, double low_x, double low_y, double h
 
 }  // namespace
 
-double allowed_misplacement(const ConversionTask& task, const TargetCell& cell,
-                            const std::optional<CellOutline>& outline) {
-  ValueRange range;
+void add_values(const ConversionTask& task, const TargetCell& cell,
+                const std::optional<CellOutline>& outline, ValueRange* range) {
   if (outline) {
     const auto& p = outline->points;
-    add_values(task, std::min({p[0].x, p[1].x, p[2].x, p[3].x}) - 1,
-               std::min({p[0].y, p[1].y, p[2].y, p[3].y}) - 1,
-               std::max({p[0].x, p[1].x, p[2].x, p[3].x}) + 1,
-               std::max({p[0].y, p[1].y, p[2].y, p[3].y}) + 1, &range);
-  } else {
-    for (const CellCorner& corner : cell.corners) {
-      // Beyond a horizon there is black.
-      if (!corner.covered) {
-        const float black[3] = {0, 0, 0};
-        range.add(black);
-        continue;
-      }
-      // About a pole a few texels are the whole turn.
-      const double x = corner.place.x, y = corner.place.y, reach = task.reach;
-      const bool pole = task.turn > 0 && (y < reach || y > task.source.layout.height - reach);
-      const double wide = pole ? task.turn : reach;
-      add_values(task, x - wide, y - reach, x + wide, y + reach, &range);
-    }
+    add_box(task, std::min({p[0].x, p[1].x, p[2].x, p[3].x}) - 1,
+            std::min({p[0].y, p[1].y, p[2].y, p[3].y}) - 1,
+            std::max({p[0].x, p[1].x, p[2].x, p[3].x}) + 1,
+            std::max({p[0].y, p[1].y, p[2].y, p[3].y}) + 1, range);
+    return;
   }
+  for (const CellCorner& corner : cell.corners) {
+    // Beyond a horizon there is black.
+    if (!corner.covered) {
+      const float black[3] = {0, 0, 0};
+      range->add(black);
+      continue;
+    }
+    const double x = corner.place.x, y = corner.place.y, reach = task.reach;
+    const double wide = by_pole(task, y) ? task.turn : reach;
+    add_box(task, x - wide, y - reach, x + wide, y + reach, range);
+  }
+}
+
+double allowed_misplacement(const ConversionTask& task, const ValueRange& range) {
   const double spread = range.spread();
   const double scale = std::max(task.source.mean, range.brightest());
   return spread > 0 ? std::min(1.0, kSpare * task.error * scale / spread) : 1.0;

@@ -2,11 +2,14 @@
 
 // One texel of a conversion of layouts: what it shows of the source, weighted by solid angle.
 
+#include <algorithm>
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "core/environment/layout_convert.h"
 #include "core/environment/polygon_coverage.h"
+#include "core/sphere/rim_patches.h"
 
 namespace lightkiln {
 
@@ -31,11 +34,15 @@ ConversionTask make_conversion(const ConversionSource& source, const MapLayout& 
 struct CellCorner {
   bool shown = false;    // the target shows a direction here
   bool covered = false;  // and the source covers it
+  GridPoint at;          // in the target
   MapPlace place;
 };
 CellCorner locate(const ConversionTask& task, double x, double y);
+// The same in the coordinates of a patch.
+CellCorner locate(const ConversionTask& task, const RimPatch& patch, double a, double b);
 
-// A rectangle of the target and its corners: top left, top right, bottom right, bottom left.
+// A rectangle of the target, or of a patch's coordinates, and its corners: top left, top right,
+// bottom right, bottom left.
 struct TargetCell {
   double x0, y0, x1, y1;
   std::array<CellCorner, 4> corners;
@@ -56,27 +63,47 @@ double grid_line(const MapLayout& layout, int line, int start, int count);
 TargetCell texel_cell(const MapLayout& layout, const TargetBlock& block, int x, int y,
                       const std::array<CellCorner, 4>& corners);
 
+// Source texels that a texel of the target spans in the direction in which it spans the fewest:
+// the smaller singular value of the map from sides in the target to sides in the source.
+double smaller_span(GridPoint first, GridPoint second, GridPoint source_first,
+                    GridPoint source_second);
+
 // The polygon of a cell in the source's picture.
 struct CellOutline {
-  std::array<GridPoint, 4> points;
+  std::array<GridPoint, 4> points, target;
   int chart = 0;
-  // The two sides, what they enclose, and the smaller extent of that parallelogram: the smaller
-  // singular value of the matrix of both.
+  // The mean of opposite sides, what they enclose, and smaller_span() by them.
   double ax = 0, ay = 0, bx = 0, by = 0;
-  double area = 0, smaller = 0;
+  double area = 0, span = 0;
+  bool wide = false;  // too wide for straight edges
 
-  // The same extent at corner i alone.
-  double smaller_at(size_t i) const;
+  // The same by the sides at corner i alone.
+  double span_at(size_t i) const;
+  // Of the longer of two opposite sides.
+  double first_length() const;
+  double second_length() const;
+  // Far longer than wide.
+  bool slender() const;
 };
-// None when the corners are not on one piece of the picture or lie too far apart for straight
-// edges.
+// None when the corners are not on one piece of the picture, or about a pole.
 std::optional<CellOutline> outline_of(const ConversionTask& task,
                                       const std::array<CellCorner, 4>& corners);
 
+// The range of the source's values, and the brightest of them.
+struct ValueRange {
+  float low[3] = {1e38f, 1e38f, 1e38f}, high[3] = {0, 0, 0};
+
+  void add(const float* value);
+  double brightest() const { return double(std::max({high[0], high[1], high[2]})); }
+  double spread() const;
+};
+// Adds all that a cell may show.
+void add_values(const ConversionTask& task, const TargetCell& cell,
+                const std::optional<CellOutline>& outline, ValueRange* range);
+
 // The share of a texel's weights that may be misplaced for the error that was ordered, by the range
-// of the source's values within reach of it; at most 1.
-double allowed_misplacement(const ConversionTask& task, const TargetCell& cell,
-                            const std::optional<CellOutline>& outline);
+// of what it may show; at most 1.
+double allowed_misplacement(const ConversionTask& task, const ValueRange& range);
 
 struct GatheredLight {
   Vec3d energy;
@@ -103,27 +130,44 @@ class TexelGatherer {
   const ConversionWork& work() const { return work_; }
 
  private:
+  // What straight edges do to a cell, as shares of its weights that are misplaced: the shift of
+  // opposite edges that bend alike, to the source's texels and to an interpolation between them,
+  // and what edges that bend unlike move from one end of the cell to another.
+  struct Bend {
+    double among_texels = 0, between_samples = 0, within = 0;
+  };
+
   void add(const TargetCell& cell, int level, GatheredLight* light);
   void add_outline(const TargetCell& cell, const CellOutline& outline, int level,
                    GatheredLight* light);
-  bool smooths_unevenly(const CellOutline& outline, double size) const;
-  double misplaced(const TargetCell& cell, const CellOutline& outline, double smooth);
+  void add_rim(const std::vector<RimPatch>& patches, GatheredLight* light);
+  // Along which sides one share of smoothing does not do for the whole cell.
+  struct Uneven {
+    bool first = false, second = false;
+  };
+  Uneven smooths_unevenly(const CellOutline& outline) const;
+  Bend bend_of(const TargetCell& cell, const CellOutline& outline);
   void add_area(const TargetCell& cell, const CellOutline& outline, double share,
                 GatheredLight* light);
-  void add_smooth(const TargetCell& cell, const CellOutline& outline, double share, int level,
-                  GatheredLight* light);
   bool add_interpolated(const CellOutline& outline, double share, GatheredLight* light);
+  // Points a texel's side for what was ordered.
+  double fineness() const;
   void add_points(const TargetCell& cell, const CellOutline& outline, double share, int level,
                   GatheredLight* light);
   void add_point(const TargetCell& cell, GatheredLight* light);
   void split(const TargetCell& cell, int level, GatheredLight* light);
+  void halve(const TargetCell& cell, bool by_columns, int level, GatheredLight* light);
+  void divide(const TargetCell& cell, const CellOutline& outline, int level, GatheredLight* light);
   CellCorner look_up(double x, double y);
+  double smooth_share_at(const TargetCell& cell, const CellCorner& centre);
   int column(int x) const;
   double solid_angle(const TargetCell& cell) const;
 
   const ConversionTask& task_;
   bool radial_;
-  double allowed_ = 0;  // of the present texel, see allowed_misplacement()
+  const RimPatch* patch_ = nullptr;  // whose coordinates cells are in; null = the image's own
+  double part_ = 1;                  // of the texel that this patch is
+  double allowed_ = 0;               // of the present texel, see allowed_misplacement()
   PolygonCoverage coverage_;
   ConversionWork work_;
 };

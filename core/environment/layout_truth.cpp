@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/environment/layout_sample.h"
+#include "core/sphere/rim_patches.h"
 
 namespace lightkiln {
 
@@ -31,6 +32,8 @@ struct Rectangle {
   double x0, y0, x1, y1;
 };
 
+// Lines are drawn in the image's own coordinates, or in those of a patch at a round rim, the second
+// of which runs slowly at both ends: there a side may be tangent to a circle.
 struct Conversion {
   const MapLayout& from;
   const Image& source;
@@ -38,30 +41,43 @@ struct Conversion {
   const Rotation& rotation;
   bool adaptive;
   RowBlend blend;
+  const RimPatch* patch = nullptr;
 
-  std::optional<MapPlace> place(double x, double y) const {
-    const std::optional<Vec3d> d = layout_direction(to, x, y);
+  std::optional<MapPlace> place_of(const std::optional<Vec3d>& d) const {
     return d ? layout_place(from, rotation.undo(*d)) : std::nullopt;
   }
-
-  // Which piece of g a point belongs to.
-  int piece(double x, double y) const {
-    const std::optional<Vec3d> d = layout_direction(to, x, y);
-    if (!d) return kNotShown;
-    const std::optional<MapPlace> q = layout_place(from, rotation.undo(*d));
-    if (!q) return kNotCovered;
-    const int column = std::clamp(static_cast<int>(q->x), 0, from.width - 1);
-    return std::clamp(static_cast<int>(q->y), 0, from.height - 1) * from.width + column;
+  // Of a point of the image.
+  std::optional<MapPlace> place(double x, double y) const {
+    return place_of(layout_direction(to, x, y));
+  }
+  static double eased(double b) { return b * b * (3 - 2 * b); }
+  // Of a point of a line.
+  std::optional<Vec3d> direction(double a, double b) const {
+    return patch != nullptr ? rim_point(to, *patch, a, eased(b)).direction
+                            : layout_direction(to, a, b);
   }
 
-  // dq/dx or dq/dy, from both sides or from the one that lies on the same chart.
-  bool derivative(double x, double y, double dx, double dy, double* along, double* down) const {
+  // Which piece of g a point of a line belongs to: a quarter of a texel of the source, on which N
+  // is constant and B a polynomial.
+  int piece(double a, double b) const {
+    const std::optional<Vec3d> d = direction(a, b);
+    if (!d) return kNotShown;
+    const std::optional<MapPlace> q = place_of(d);
+    if (!q) return kNotCovered;
+    const int column = std::clamp(static_cast<int>(2 * q->x), 0, 2 * from.width - 1);
+    return std::clamp(static_cast<int>(2 * q->y), 0, 2 * from.height - 1) * 2 * from.width + column;
+  }
+
+  // dq/dx or dq/dy, from both sides or from the one that lies on the same chart. `at` gives places.
+  template <typename Places>
+  static bool derivative(const MapLayout& from, const Places& at, double x, double y, double dx,
+                         double dy, double* along, double* down) {
     constexpr double kStep = 1e-5;
-    const std::optional<MapPlace> here = place(x, y);
+    const std::optional<MapPlace> here = at(x, y);
     int sides = 0;
     *along = *down = 0;
     for (const double step : {kStep, -kStep}) {
-      const std::optional<MapPlace> there = place(x + step * dx, y + step * dy);
+      const std::optional<MapPlace> there = at(x + step * dx, y + step * dy);
       if (!here || !there || there->chart != here->chart) continue;
       double change = there->x - here->x;
       if (const int turn = turn_columns(from)) change -= turn * std::nearbyint(change / turn);
@@ -79,7 +95,9 @@ struct Conversion {
   double smooth_share(double x, double y) const {
     if (!adaptive) return 0;
     double ax = 0, ay = 0, bx = 0, by = 0;
-    if (!derivative(x, y, 1, 0, &ax, &ay) || !derivative(x, y, 0, 1, &bx, &by)) return 1;
+    const auto at = [&](double px, double py) { return place(px, py); };
+    if (!derivative(from, at, x, y, 1, 0, &ax, &ay)) return 1;
+    if (!derivative(from, at, x, y, 0, 1, &bx, &by)) return 1;
     // The singular values' squares are the roots of z^2 - trace z + det^2.
     const double trace = ax * ax + ay * ay + bx * bx + by * by, det = ax * by - ay * bx;
     const double larger = 0.5 * (trace + std::sqrt(std::max(0.0, trace * trace - 4 * det * det)));
@@ -87,14 +105,30 @@ struct Conversion {
     return std::clamp(2 - 2 * smaller, 0.0, 1.0);
   }
 
-  Vec3d value(double x, double y, double* brightest) const {
-    const std::optional<MapPlace> q = place(x, y);
-    if (!q) return {};
-    const double share = smooth_share(x, y);
+  struct Sample {
+    Vec3d radiance;
+    double density = 0;
+  };
+  // At a point of a line; the density is that of its coordinates.
+  Sample sample(double a, double b, double* brightest) const {
+    Sample sample;
+    RimPoint point{{}, a, b};
+    std::optional<MapPlace> q;
+    if (patch != nullptr) {
+      point = rim_point(to, *patch, a, eased(b));
+      q = place_of(point.direction);
+      sample.density = rim_density(to, *patch, eased(b)) * 6 * b * (1 - b);
+    } else {
+      q = place(a, b);
+      sample.density = solid_angle_density(to, a, b);
+    }
+    if (!q) return sample;
+    const double share = smooth_share(point.x, point.y);
     const Vec3d held = nearest_radiance(from, source, *q);
     *brightest = std::max({*brightest, held.x, held.y, held.z});
-    if (share <= 0) return held;
-    return held * (1 - share) + smooth_radiance(from, source, *q, blend) * share;
+    sample.radiance = held * (1 - share);
+    if (share > 0) sample.radiance += smooth_radiance(from, source, *q, blend) * share;
+    return sample;
   }
 };
 
@@ -108,34 +142,29 @@ void add_piece(const Conversion& conversion, const Line& line, double from, doub
   const double node = 0.5 / std::sqrt(3.0);
   for (const double offset : {0.5 - node, 0.5 + node}) {
     const double t = from + offset * (to - from);
-    const double x = line.at_x(t), y = line.at_y(t);
-    const double omega = 0.5 * (to - from) * weight * solid_angle_density(conversion.to, x, y);
-    sums->energy += conversion.value(x, y, &sums->brightest) * omega;
+    const Conversion::Sample sample =
+        conversion.sample(line.at_x(t), line.at_y(t), &sums->brightest);
+    const double omega = 0.5 * (to - from) * weight * sample.density;
+    sums->energy += sample.radiance * omega;
     sums->omega += omega;
   }
 }
 
-// From one step to the next, split wherever the piece changes.
-void add_step(const Conversion& conversion, const Line& line, double from, double to, int piece,
-              int end_piece, double weight, Sums* sums) {
-  while (piece != end_piece) {
-    double before = from, after = to;
-    int next = end_piece;
-    for (int i = 0; i < 30; ++i) {
-      const double middle = 0.5 * (before + after);
-      const int found = conversion.piece(line.at_x(middle), line.at_y(middle));
-      if (found == piece) {
-        before = middle;
-      } else {
-        after = middle;
-        next = found;
-      }
+// Where between `from`, on `piece`, and `to`, on another, the piece ends.
+double end_of_piece(const Conversion& conversion, const Line& line, double from, double to,
+                    int piece, double* begin_of_next, int* next) {
+  for (int i = 0; i < 30; ++i) {
+    const double middle = 0.5 * (from + to);
+    const int found = conversion.piece(line.at_x(middle), line.at_y(middle));
+    if (found == piece) {
+      from = middle;
+    } else {
+      to = middle;
+      *next = found;
     }
-    if (piece != kNotShown) add_piece(conversion, line, from, before, weight, sums);
-    from = after;
-    piece = next;
   }
-  if (piece != kNotShown) add_piece(conversion, line, from, to, weight, sums);
+  *begin_of_next = to;
+  return from;
 }
 
 // Source texels from one end of the line to the other, along the way.
@@ -144,7 +173,8 @@ double span_of(const Conversion& conversion, const Line& line) {
   std::optional<MapPlace> last;
   for (int i = 0; i <= 8; ++i) {
     const double t = line.length * i / 8;
-    const std::optional<MapPlace> q = conversion.place(line.at_x(t), line.at_y(t));
+    const std::optional<MapPlace> q =
+        conversion.place_of(conversion.direction(line.at_x(t), line.at_y(t)));
     if (q && last && q->chart == last->chart) {
       double dx = q->x - last->x;
       if (const int turn = turn_columns(conversion.from)) dx -= turn * std::nearbyint(dx / turn);
@@ -157,15 +187,27 @@ double span_of(const Conversion& conversion, const Line& line) {
 
 void add_line(const Conversion& conversion, const Line& line, double weight, Sums* sums) {
   // Twelve steps a source texel: a corner cut off between two steps is under 1/600 of a texel.
-  const int steps = std::clamp(static_cast<int>(12 * span_of(conversion, line)), 16, 4096);
-  double from = 0;
+  const int steps = std::clamp(static_cast<int>(12 * span_of(conversion, line)), 6, 4096);
+  // The solid angle bends as well.
+  const double longest = line.length / 4;
+  double begin = 0, last = 0;
   int piece = conversion.piece(line.x, line.y);
   for (int i = 1; i <= steps; ++i) {
     const double to = line.length * i / steps;
     const int end = conversion.piece(line.at_x(to), line.at_y(to));
-    add_step(conversion, line, from, to, piece, end, weight, sums);
-    from = to;
-    piece = end;
+    while (piece != end) {
+      double next_begin = to;
+      int next = end;
+      const double finish = end_of_piece(conversion, line, last, to, piece, &next_begin, &next);
+      if (piece != kNotShown) add_piece(conversion, line, begin, finish, weight, sums);
+      begin = last = next_begin;
+      piece = next;
+    }
+    last = to;
+    if (i == steps || last - begin >= longest) {
+      if (piece != kNotShown) add_piece(conversion, line, begin, last, weight, sums);
+      begin = last;
+    }
   }
 }
 
@@ -173,19 +215,35 @@ void add_line(const Conversion& conversion, const Line& line, double weight, Sum
 // the texel is mirrored: solves J direction = (1, 0.6) or (1, -0.6).
 struct Direction {
   double dx, dy;
+  double across;  // source texels that a unit step across it is away from the line
+  double det;     // source texels to a unit of area
 };
 Direction oblique(const Conversion& conversion, double x, double y) {
   double ax = 0, ay = 0, bx = 0, by = 0;
-  conversion.derivative(x, y, 1, 0, &ax, &ay);
-  conversion.derivative(x, y, 0, 1, &bx, &by);
+  const auto at = [&](double a, double b) {
+    return conversion.place_of(conversion.direction(a, b));
+  };
+  Conversion::derivative(conversion.from, at, x, y, 1, 0, &ax, &ay);
+  Conversion::derivative(conversion.from, at, x, y, 0, 1, &bx, &by);
   const double det = ax * by - ay * bx;
-  Direction direction{1, 0.6};
-  if (det != 0) direction = {(by - 0.6 * bx) / det, (0.6 * ax - ay) / det};
-  const double length = std::hypot(direction.dx, direction.dy);
-  return {direction.dx / length, direction.dy / length};
+  if (det == 0) return {std::sqrt(0.5), std::sqrt(0.5), 0, 0};
+  const double dx = (by - 0.6 * bx) / det, dy = (0.6 * ax - ay) / det;
+  const double length = std::hypot(dx, dy);
+  return {dx / length, dy / length, std::abs(det) * length / std::hypot(1, 0.6), std::abs(det)};
 }
 
-void add_rectangle(const Conversion& conversion, const Rectangle& r, int lines, Sums* sums) {
+// A line's integral bends where it passes a corner of the source's texels. With n lines to a source
+// texel each bend costs about 1 / (12 n^2) of what neighbours differ by, A texels have A of them,
+// of any sign, and 1 / (12 n^2 sqrt(A)) is left. `lines` are those of a texel that spans two of the
+// source; `share` is the rectangle's of its texel.
+int lines_needed(int lines, double share, double texels_across, double texels_inside) {
+  const double most = lines * std::max(1.0, 0.5 * texels_across /
+                                                std::sqrt(std::sqrt(std::max(1.0, texels_inside))));
+  return std::clamp(static_cast<int>(most * std::min(1.0, 2 * std::sqrt(share))), 6, 4096);
+}
+
+void add_rectangle(const Conversion& conversion, const Rectangle& r, int least, double share,
+                   Sums* sums) {
   const double w = r.x1 - r.x0, h = r.y1 - r.y0;
   const Direction along = oblique(conversion, r.x0 + 0.5 * w, r.y0 + 0.5 * h);
   // Lines that fall to the left are drawn on the mirrored rectangle.
@@ -193,19 +251,28 @@ void add_rectangle(const Conversion& conversion, const Rectangle& r, int lines, 
   const double dx = std::abs(along.dx), dy = std::abs(along.dy);
   // The offset of a line across its direction, 0 at the upper right corner.
   const double width = w * dy + h * dx;
-  for (int i = 0; i < lines; ++i) {
-    const double offset = width * (i + 0.5) / lines;
-    // Through (x1 - offset dy, y0 + offset dx), cut at the four sides.
-    const double px = w - offset * dy, py = offset * dx;
-    constexpr double kNever = 1e9;
-    const double enter = std::max(dx > 0 ? -px / dx : -kNever, dy > 0 ? -py / dy : -kNever);
-    const double leave = std::min(dx > 0 ? (w - px) / dx : kNever, dy > 0 ? (h - py) / dy : kNever);
-    if (!(leave > enter)) continue;
-    const double x = px + enter * dx;
-    add_line(conversion,
-             {mirrored ? r.x1 - x : r.x0 + x, r.y0 + py + enter * dy, mirrored ? -dx : dx, dy,
-              leave - enter},
-             width / lines, sums);
+  const int lines = lines_needed(least, share, width * along.across, along.det * w * h);
+  // What a line gives bends where it passes a corner of the rectangle.
+  const double corners[4] = {0, std::min(w * dy, h * dx), std::max(w * dy, h * dx), width};
+  for (int section = 0; section < 3; ++section) {
+    const double begin = corners[section], size = corners[section + 1] - begin;
+    if (size <= 0) continue;
+    const int pairs = static_cast<int>(std::ceil(0.5 * lines * size / width));
+    for (int i = 0; i < 2 * pairs; ++i) {
+      const double node = (i % 2 == 0 ? -0.5 : 0.5) / std::sqrt(3.0);
+      const double offset = begin + size * (i / 2 + 0.5 + node) / pairs;
+      // Through (x1 - offset dy, y0 + offset dx), cut at the four sides.
+      const double px = w - offset * dy, py = offset * dx;
+      constexpr double kNever = 1e9;
+      const double enter = std::max(dx > 0 ? -px / dx : -kNever, dy > 0 ? -py / dy : -kNever);
+      const double leave =
+          std::min(dx > 0 ? (w - px) / dx : kNever, dy > 0 ? (h - py) / dy : kNever);
+      if (!(leave > enter)) continue;
+      const double x = px + enter * dx;
+      const Line line{mirrored ? r.x1 - x : r.x0 + x, r.y0 + py + enter * dy, mirrored ? -dx : dx,
+                      dy, leave - enter};
+      add_line(conversion, line, size / (2 * pairs), sums);
+    }
   }
 }
 
@@ -226,8 +293,17 @@ Rectangle shown_part(const MapLayout& layout, int x, int y) {
 
 LayoutTruth layout_truth(const MapLayout& from, const Image& source, const MapLayout& to,
                          const Rotation& rotation, MapFilter filter, int x, int y, int lines) {
-  const Conversion conversion{from,          source, to, rotation, filter == MapFilter::adaptive,
-                              RowBlend(from)};
+  Conversion conversion{from, source, to, rotation, filter == MapFilter::adaptive, RowBlend(from)};
+  Sums sums;
+  if (const std::vector<RimPatch> patches = rim_patches(to, x, y); !patches.empty()) {
+    const double whole = texel_solid_angle(to, x, y);
+    for (const RimPatch& patch : patches) {
+      conversion.patch = &patch;
+      const double share = rim_solid_angle(to, patch, 0, 1, 0, 1) / whole;
+      add_rectangle(conversion, {0, 0, 1, 1}, lines, std::clamp(share, 0.0, 1.0), &sums);
+    }
+    return {sums.omega > 0 ? sums.energy / sums.omega : Vec3d{}, sums.brightest};
+  }
   std::vector<Rectangle> parts = {shown_part(to, x, y)};
   const std::optional<Vec3d> centre = layout_direction(to, x + 0.5, y + 0.5);
   if (to.convention == TexelConvention::openexr && centre) {
@@ -243,9 +319,8 @@ LayoutTruth layout_truth(const MapLayout& from, const Image& source, const MapLa
       }
     }
   }
-  Sums sums;
   const int each = std::max(6, lines / static_cast<int>(parts.size()));
-  for (const Rectangle& part : parts) add_rectangle(conversion, part, each, &sums);
+  for (const Rectangle& part : parts) add_rectangle(conversion, part, each, 1, &sums);
   return {sums.omega > 0 ? sums.energy / sums.omega : Vec3d{}, sums.brightest};
 }
 

@@ -140,6 +140,13 @@ Vec3d radial_direction(const MapLayout& layout, double right, double up) {
                    frame.axis * std::cos(angle));
 }
 
+Vec3d radial_direction_at(const MapLayout& layout, double right, double up, double theta) {
+  const Frame frame = frame_of(layout);
+  const double across = std::sin(theta);
+  return normalize(frame.right * (across * right) + frame.up * (across * up) +
+                   frame.axis * std::cos(theta));
+}
+
 bool radial_coordinates(const MapLayout& layout, const Vec3d& direction, double* right,
                         double* up) {
   const Frame frame = frame_of(layout);

@@ -20,6 +20,8 @@ double radial_density(const MapLayout& layout, double radius);
 
 // (right, up) in the unit disc, and the direction.
 Vec3d radial_direction(const MapLayout& layout, double right, double up);
+// At an angle from the axis, towards the unit vector (right, up).
+Vec3d radial_direction_at(const MapLayout& layout, double right, double up, double theta_rad);
 // False when the direction is not covered.
 bool radial_coordinates(const MapLayout& layout, const Vec3d& direction, double* right, double* up);
 
