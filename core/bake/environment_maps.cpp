@@ -51,9 +51,9 @@ std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_m
       grants,
       decoded.format,
       source_warnings(*spec.environment, inputs, parameters.source, decoded),
-      MapsLight(make_environment(std::move(decoded),
-                                 environment_reading(*spec.environment, parameters.source),
-                                 rotation_of(parameters.rotation), grants.threads),
+      MapsLight(make_pending_environment(std::move(decoded),
+                                         environment_reading(*spec.environment, parameters.source),
+                                         rotation_of(parameters.rotation), grants.threads),
                 grants.threads, sun_options(parameters)),
       {}});
   state->outputs =
@@ -137,9 +137,7 @@ Effect rotation_effect(const EnvironmentMapsState& state) {
   const Environment& environment = state.light.environment();
   if (environment.rotation.is_identity()) return {"rotation", false, "Not ordered.", 0};
   return {"rotation", true,
-          "The environment is turned before anything is made of it; layouts are turned from the "
-          "file's own pixels.",
-          1};
+          "Every output is turned as it is made; the map itself is not resampled for it.", 1};
 }
 
 Effect harmonics_effect(const EnvironmentMapsState& state) {

@@ -3,6 +3,8 @@
 // What environment maps cost: seconds an operation on a 3 GHz core, measured on a 2048 x 1024 map.
 // A plan multiplies its operation counts by these and by this machine's speed.
 
+#include "core/environment/layout_convert.h"
+
 namespace lightkiln {
 
 inline constexpr double kDecodePerTexel = 4e-9;      // statistics; decoding is the input's own time
@@ -22,6 +24,11 @@ inline constexpr double kConvertPerPlace = 4.5e-8;
 inline constexpr double kConvertPerPolygon = 8e-8;
 inline constexpr double kConvertPerCovered = 5.4e-8;
 inline constexpr double kConvertPerPoint = 1.1e-7;
+// Beside what walks over whole grids.
+inline double conversion_seconds(const ConversionWork& work) {
+  return kConvertPerPlace * work.places + kConvertPerPolygon * work.polygons +
+         kConvertPerCovered * work.covered + kConvertPerPoint * work.points;
+}
 inline constexpr double kConvertPerCheck = 1.2e-3;  // and as much for each source texel across one
 inline constexpr double kLookUpPerTexel = 2.5e-7;   // of the source, for the round trip
 inline constexpr double kPerDfgPoint = 3.1e-9;

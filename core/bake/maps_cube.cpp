@@ -20,12 +20,15 @@ ConvolvedCube::ConvolvedCube(MapsLight& light, int size, std::optional<Lobe> lob
   if (constant_) return;
   if (lobe_)
     plan_ = plan_lobe(light.statistics(), *lobe_, target);
+  else if (!light.environment().pending.is_identity())
+    turned_ = plan_turned_cube(light.environment(), ordered_error(target));
   else
     rounding_ = kResampleRounding * std::hypot(1, light.statistics().spread);
 }
 
 double ConvolvedCube::error_bound() const {
   if (constant_) return 0;
+  if (turned_) return turned_->error_bound;
   return lobe_ ? plan_.error_bound : rounding_;
 }
 
@@ -37,6 +40,12 @@ double ConvolvedCube::model_seconds(MapsLight& light) const {
   if (constant_) return 0;
   const Image& map = light.environment().radiance;
   const double texels = 6.0 * size_ * size_;
+  if (turned_) {
+    const ConversionSource source(make_layout(LayoutKind::latlong, map.width), map);
+    return conversion_seconds(estimate_conversion(
+        source, make_layout(LayoutKind::cube_strip, size_), light.environment().pending,
+        MapFilter::area, turned_->conversion_error));
+  }
   if (!lobe_) return kResamplePerCell * (map.width + 4.0 * size_) * (map.height + 2.0 * size_);
   const double cut = plan_.bands;
   const double points =
@@ -54,6 +63,9 @@ double ConvolvedCube::model_seconds(MapsLight& light) const {
 }
 
 Image ConvolvedCube::make_cube(MapsLight& light, Progress& progress) const {
+  if (turned_) {
+    return turn_to_cube(light.environment(), *turned_, size_, light.threads(), progress);
+  }
   if (!constant_ && !lobe_) {
     return resample_to_cube(light.environment().radiance, size_, light.threads(), progress);
   }
@@ -79,10 +91,11 @@ CheckedTexels::CheckedTexels(int count, int face_size_) : face_size(face_size_) 
   }
 }
 
-std::vector<Vec3d> CheckedTexels::directions() const {
+std::vector<Vec3d> CheckedTexels::directions(const Rotation& turn) const {
   std::vector<Vec3d> all;
   for (const auto& [x, line] : texels) {
-    all.push_back(cube_texel_direction(line / face_size, x, line % face_size, face_size));
+    all.push_back(
+        turn.undo(cube_texel_direction(line / face_size, x, line % face_size, face_size)));
   }
   return all;
 }
@@ -129,7 +142,8 @@ MeasuredError ConvolvedCube::check(MapsLight& light, const Image& cube, int coun
                                    Progress& progress) const {
   const CheckedTexels checked(count, size_);
   const LobeAverages truths = lobe_ ? lobe_averages(light.environment(), *make_twin_lobe(*lobe_),
-                                                    checked.directions(), light.threads(), progress)
+                                                    checked.directions(light.environment().pending),
+                                                    light.threads(), progress)
                                     : slow_texels(light, checked, progress);
   return checked.compare(cube, truths, scale_, scale_ * luminance(light.environment().mean));
 }

@@ -7,6 +7,7 @@
 
 #include "core/bake/maps_output.h"
 #include "core/environment/lobe_averages.h"
+#include "core/environment/turned_cube.h"
 
 namespace lightkiln {
 
@@ -16,8 +17,8 @@ struct CheckedTexels {
     int x, line;  // of the strip of faces
   };
   CheckedTexels(int count, int face_size);
-  // Of the texels' middles.
-  std::vector<Vec3d> directions() const;
+  // Of the texels' middles, turned back.
+  std::vector<Vec3d> directions(const Rotation& turn) const;
   // Against `truths` times `factor`, relative to `scale`.
   MeasuredError compare(const Image& cube, const LobeAverages& truths, double factor,
                         double scale) const;
@@ -55,6 +56,7 @@ class ConvolvedCube : public MapsOutput {
   LobePlan plan_;  // empty when nothing is convolved
   // Of the map itself on a cube: every texel's, of which the mean square is at most 1 + spread^2.
   double rounding_ = 0;
+  std::optional<TurnedCubePlan> turned_;  // where a turn is pending
 };
 
 }  // namespace lightkiln

@@ -134,8 +134,9 @@ class BandedIrradianceCube : public MapsOutput {
   // Against the same bands, not against the whole.
   MeasuredError check(MapsLight& light, const Image& cube, int count, Progress& progress) const {
     const CheckedTexels checked(count, size_);
-    const LobeAverages truths = lobe_averages(light.environment(), BandedCosine(plan_.responses),
-                                              checked.directions(), light.threads(), progress);
+    const LobeAverages truths =
+        lobe_averages(light.environment(), BandedCosine(plan_.responses),
+                      checked.directions(light.environment().pending), light.threads(), progress);
     return checked.compare(cube, truths, kPi, kPi * luminance(light.environment().mean));
   }
 

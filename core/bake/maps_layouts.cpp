@@ -87,8 +87,7 @@ class LayoutImage : public MapsOutput {
       const double size = cube_face_size(layout_);
       return seconds + kResamplePerCell * (source.width + 4 * size) * (source.height + 2 * size);
     }
-    return seconds + kConvertPerPlace * work.places + kConvertPerPolygon * work.polygons +
-           kConvertPerCovered * work.covered + kConvertPerPoint * work.points;
+    return seconds + conversion_seconds(work);
   }
 
   double check_seconds(MapsLight& light) const override {

@@ -6,7 +6,9 @@ namespace lightkiln {
 
 MapsLight::MapsLight(Environment environment, int threads, const std::optional<SunOptions>& sun)
     : environment_(std::move(environment)), threads_(threads) {
-  if (sun) sun_ = extract_sun(environment_, *sun);
+  if (!sun) return;
+  sun_ = extract_sun(environment_, *sun);
+  sun_->disk.direction = environment_.pending.apply(sun_->disk.direction);
 }
 
 const LightStatistics& MapsLight::statistics() {

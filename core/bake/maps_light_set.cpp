@@ -70,7 +70,8 @@ class LightSet : public MapsOutput {
     writer.u64(table.size());
     for (const LightSetError& row : table) write_error(row, writer);
     for (const DirectionalLight& l : chosen) {
-      for (int c = 0; c < 3; ++c) writer.f64(l.direction[c]);
+      const Vec3d direction = light.environment().pending.apply(l.direction);
+      for (int c = 0; c < 3; ++c) writer.f64(direction[c]);
       for (int c = 0; c < 3; ++c) writer.f64(l.irradiance[c]);
     }
     return {IrradianceReference::kNormals, error.rms, error.max};

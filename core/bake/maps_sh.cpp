@@ -8,6 +8,7 @@
 #include "core/bake/window_report.h"
 #include "core/base/parallel.h"
 #include "core/environment/brute_force.h"
+#include "core/sphere/harmonic_rotation.h"
 
 namespace lightkiln {
 
@@ -58,7 +59,11 @@ MeasuredError check_coefficients(MapsLight& light, int bands, int count, Progres
 }
 
 ShRgb radiance_coefficients(MapsLight& light, int bands, Progress& progress) {
-  if (!light.constant()) return world_harmonics(light.spectrum(progress), bands);
+  if (!light.constant()) {
+    const ShRgb sh = world_harmonics(light.spectrum(progress), bands);
+    const Rotation& turn = light.environment().pending;
+    return turn.is_identity() ? sh : sh_rotate(sh, turn.rows);
+  }
   ShRgb sh(bands);
   sh.coefficients[0] = light.environment().mean * (2 * std::sqrt(kPi));
   return sh;

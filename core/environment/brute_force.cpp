@@ -88,10 +88,11 @@ Vec3d texel_average(const Environment& environment, int face, int x, int y, int 
                     int meridians) {
   const Image& map = environment.radiance;
   const auto corner = [&](int i, int j) {
-    return cube_direction(face, double(x + i) / size, double(y + j) / size);
+    return environment.pending.undo(
+        cube_direction(face, double(x + i) / size, double(y + j) / size));
   };
   const std::array<Vec3d, 4> corners = {corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)};
-  const Vec3d centre = cube_texel_direction(face, x, y, size);
+  const Vec3d centre = environment.pending.undo(cube_texel_direction(face, x, y, size));
   std::array<Vec3d, 4> planes;
   bool pole = true;
   for (size_t i = 0; i < 4; ++i) {

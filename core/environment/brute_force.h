@@ -11,7 +11,8 @@ namespace lightkiln {
 // < 0 is the sine of |m|.
 Vec3d projected_coefficient(const Environment& environment, int l, int m);
 
-// The mean of the map, constant on each texel, over a texel of a cube: `meridians` of every column
+// The mean of the map, constant on each texel and turned by what is pending, over a texel of a
+// cube: `meridians` of every column
 // of the map, each cut by the four planes of the texel's sides and summed row by row. Its error
 // falls as their square: to about 1e-5 of what the columns differ by at 64.
 Vec3d texel_average(const Environment& environment, int face, int x, int y, int size,

@@ -115,6 +115,15 @@ Environment make_environment(DecodedImage decoded, const SourceReading& reading,
   return environment;
 }
 
+Environment make_pending_environment(DecodedImage decoded, const SourceReading& reading,
+                                     const Rotation& rotation, int threads, Progress* progress) {
+  const bool moved = whole_columns(source_layout(decoded, reading), rotation).has_value();
+  Environment environment = make_environment(std::move(decoded), reading,
+                                             moved ? rotation : Rotation{}, threads, progress);
+  if (!moved) environment.rotation = environment.pending = rotation;
+  return environment;
+}
+
 Environment constant_environment(const Vec3& radiance) {
   Environment environment;
   environment.radiance = Image(1, 1, 3);

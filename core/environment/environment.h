@@ -22,7 +22,8 @@ struct Environment {
   // themselves.
   MapLayout source_layout;
   Image source;
-  Rotation rotation;         // already applied to `radiance`
+  Rotation rotation;         // as ordered
+  Rotation pending;          // what of it is still to be applied to all that is made of `radiance`
   double covered_share = 1;  // of the sphere, by the source; the rest is black
 
   // What other layouts are converted from: the file's own pixels, or `radiance` where light has
@@ -30,7 +31,7 @@ struct Environment {
   bool reduced = false;
   const Image& source_image() const { return source.pixels.empty() ? radiance : source; }
   MapLayout source_image_layout() const;
-  Rotation source_image_rotation() const { return reduced ? Rotation{} : rotation; }
+  Rotation source_image_rotation() const { return reduced ? pending : rotation; }
 };
 
 // Takes a decoded image: finds its layout, converts 1 channel to 3, sanitises and counts, turns and
@@ -43,6 +44,12 @@ struct Environment {
 Environment make_environment(DecodedImage decoded, const SourceReading& reading = {},
                              const Rotation& rotation = {}, int threads = 1,
                              Progress* progress = nullptr);
+
+// The same, but a turn that would resample the map is left pending, for those who look `radiance`
+// up at R^-1 d themselves: resampling is an error that no bound of theirs tells.
+Environment make_pending_environment(DecodedImage decoded, const SourceReading& reading,
+                                     const Rotation& rotation, int threads = 1,
+                                     Progress* progress = nullptr);
 
 // A constant environment of the given radiance (1x1 texel).
 Environment constant_environment(const Vec3& radiance);

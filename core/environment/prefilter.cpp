@@ -72,6 +72,8 @@ Image convolve_lobe(const Environment& environment, const LightStatistics& light
     parts.near.emplace(environment.radiance, lobe.lobe.alpha, lobe.split, lobe.tolerance);
   }
   Image cube(face_size, 6 * face_size, 3);
+  const Rotation turn = environment.pending;
+  const bool turned = !turn.is_identity();
   RangeReport report;
   std::mutex mutex;
   parallel_blocks(
@@ -81,8 +83,9 @@ Image convolve_lobe(const Environment& environment, const LightStatistics& light
         for (size_t row = begin; row < end; ++row) {
           const int line = static_cast<int>(row);
           for (int x = 0; x < face_size; ++x) {
-            const Vec3d value = parts.at(
-                cube_texel_direction(line / face_size, x, line % face_size, face_size), work);
+            const Vec3d direction =
+                cube_texel_direction(line / face_size, x, line % face_size, face_size);
+            const Vec3d value = parts.at(turned ? turn.undo(direction) : direction, work);
             double most = 0;
             for (int c = 0; c < 3; ++c) {
               const double inside =

@@ -78,7 +78,8 @@ struct RangeReport {
   uint64_t texels = 0;
   double most = 0;  // relative to the mean luminance
 };
-// The lobe's average of the map about the centre of every texel of a cube.
+// The lobe's average of the map, turned by what is pending, about the centre of every texel of a
+// cube.
 Image convolve_lobe(const Environment& environment, const LightStatistics& light,
                     const LatlongSpectrum& spectrum, const LobePlan& lobe, int face_size,
                     int threads, Progress& progress, RangeReport* range = nullptr);

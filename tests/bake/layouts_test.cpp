@@ -5,6 +5,7 @@
 
 #include "core/bake/bake.h"
 #include "core/image/exr.h"
+#include "core/sphere/direction_map.h"
 #include "core/sphere/harmonic_rotation.h"
 #include "core/sphere/map_layout.h"
 #include "tests/bake/maps_orders.h"
@@ -180,6 +181,10 @@ TEST(Layouts, TurnsEveryOutputAlike) {
   EnvironmentMapsParameters parameters;
   parameters.sh = ShOutput{};
   parameters.layouts[size_t(LayoutKind::octahedral)] = sized(48);
+  parameters.layouts[size_t(LayoutKind::cube_strip)] = sized(8);
+  parameters.irradiance = IrradianceOutput{8, IrradianceMethod::harmonics, 3};
+  parameters.prefilter = PrefilterOutput{8, 2};
+  parameters.light_set = LightSetOutput{4};
   const Baked still = bake(parameters, file);
   EnvironmentMapsParameters same = parameters;
   same.rotation.quaternion = {0, 0, 0, -3};
@@ -200,11 +205,31 @@ TEST(Layouts, TurnsEveryOutputAlike) {
     double difference = 0;
     for (size_t i = 0; i < 9; ++i) {
       EXPECT_LT(length(baked.document().sh->sh.coefficients[i] - exact.coefficients[i]),
-                2e-3 * length(exact.coefficients[0]));
+                1e-9 * length(exact.coefficients[0]));
       difference = std::max(
           difference, length(still.document().sh->sh.coefficients[i] - exact.coefficients[i]));
     }
     EXPECT_GT(difference, 0.01 * length(exact.coefficients[0]));  // the turn shows
+    // Cubes and lights stand where the coefficients say.
+    const Image irradiance = read_exr(baked.artifact("irradiance.exr").bytes).image;
+    const Image level = read_exr(baked.artifact("prefilter_0.exr").bytes).image;
+    const Image strip = read_exr(baked.artifact("layout_cube_strip.exr").bytes).image;
+    const double mean = luminance(baked.document().mean);
+    for (int line = 0; line < irradiance.height; ++line) {
+      for (int x = 0; x < irradiance.width; ++x) {
+        const Vec3d truth = sh_irradiance(exact, cube_texel_direction(line / 8, x, line % 8, 8));
+        EXPECT_LT(length(to_double(irradiance.rgb(x, line)) - truth), 1e-4 * kPi * mean);
+        EXPECT_LT(length(to_double(level.rgb(x, line)) - to_double(strip.rgb(x, line))),
+                  5e-3 * length(to_double(strip.rgb(x, line))) + 5e-3 * mean);
+      }
+    }
+    const auto moment = [](const Baked& one) {
+      Vec3d sum;
+      for (const DirectionalLight& light : one.document().light_set->lights)
+        sum += light.direction * luminance(light.irradiance);
+      return sum;
+    };
+    EXPECT_LT(length(moment(baked) - rotation.apply(moment(still))), 1e-9 * mean);
   }
 }
 

@@ -138,6 +138,12 @@ TEST(MapsSun, IsGoneFromEveryLayoutOfATurnedMap) {
     // Turning spreads the sun's rim; what is under 1e-4 of its peak counts as its surroundings.
     EXPECT_LT(brightest(rest, name), 1e-4 * 1e5) << name;
   }
+  EnvironmentMapsParameters unturned = parameters;
+  unturned.rotation = {};
+  const Assembly still = bake(order(unturned), exr_of(sunny_map()));
+  EXPECT_LT(length(document_of(rest).sun->disk.direction -
+                   yaw_rotation(33).apply(document_of(still).sun->disk.direction)),
+            1e-12);
   // The document tells the file as it is.
   EXPECT_EQ(document_of(rest).source_width, document_of(whole).source_width);
   EXPECT_FALSE(document_of(rest).rotation.is_identity());
