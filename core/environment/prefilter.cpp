@@ -20,7 +20,7 @@ int row_points(int height, std::span<const LobePlan> lobes, const ShNeed& sh) {
     bool enough = sh.bands == 0 || row_band_error(points, sh.bands - 1, height) <= sh.error;
     for (size_t i = 0; i < lobes.size() && enough; ++i) {
       double squares = 0;
-      for (size_t l = 1; l < lobes[i].responses.size(); ++l) {
+      for (size_t l = 0; l < lobes[i].responses.size(); ++l) {
         const double error = row_band_error(points, static_cast<int>(l), height);
         squares += error * error * lobes[i].responses[l] * lobes[i].responses[l];
       }
