@@ -131,7 +131,6 @@ std::vector<double> cell_means(const std::vector<double>& table, double extent) 
 struct Cells {
   int rows = 1, columns = 1;
   double height = 0, width = 0;  // of a cell, radians along the sphere
-  double side2() const { return (height * height + width * width) / 2; }
 };
 
 // Of the three finest numbers of rows that are fine enough, the one whose cells are most nearly
@@ -152,12 +151,33 @@ Cells cells_of(const BrightTexel& texel, int bands, double phase) {
   return best;
 }
 
+// The cells of one row of a texel.
+struct CellRow {
+  double colatitude, share;  // of the cells' middles; of the texel's light
+  double height, width;      // of a cell
+  double side2() const { return (height * height + width * width) / 2; }
+};
+std::vector<CellRow> rows_of(const BrightTexel& texel, const Cells& cells) {
+  double u = 0, v = 0;
+  latlong_coordinates(texel.direction, &u, &v);
+  std::vector<CellRow> rows;
+  double all = 0;
+  for (int j = 0; j < cells.rows; ++j) {
+    const double t = kPi * v + cells.height * (j + 0.5 - 0.5 * cells.rows), sine = std::sin(t);
+    rows.push_back({t, sine, cells.height, texel.extent_rad * sine / cells.columns});
+    all += sine;
+  }
+  for (CellRow& row : rows) row.share /= all;
+  return rows;
+}
+
 // The mean over all bright light of a cell's squared side.
 double common_side2(const LightStatistics& light, int bands, double phase) {
   double sum = 0, all = 0;
   for (const BrightTexel& texel : light.bright) {
     const double energy = luminance(texel.energy);
-    sum += energy * cells_of(texel, bands, phase).side2();
+    for (const CellRow& row : rows_of(texel, cells_of(texel, bands, phase)))
+      sum += energy * row.share * row.side2();
     all += energy;
   }
   return sum / all;
@@ -177,7 +197,12 @@ double kink_mean(double c, double a, double b) {
 
 }  // namespace
 
-// Cells of equal steps of longitude and colatitude.
+// Cells of equal steps of longitude and colatitude. The integral of the direction over one between
+// colatitudes t and t + h and longitudes 2 f apart has the component
+//   integral cos sin = sin(2t + h) sin(h) / 2  along the polar axis and
+//   integral sin^2 times sin(f) / f = (h - cos(2t + h) sin(h)) / 2 sin(f) / f  across it,
+// over a solid angle of 2 sin(t + h/2) sin(h/2) a radian of longitude: above the horizon a cosine's
+// mean is that with the mean direction, which is a little shorter than 1.
 CutLight::CutLight(const LightStatistics& light, const ZonalKernel& kernel,
                    const std::vector<double>& responses, double phase)
     : slope_(kernel.horizon_slope()) {
@@ -186,25 +211,24 @@ CutLight::CutLight(const LightStatistics& light, const ZonalKernel& kernel,
     const Cells cells = cells_of(texel, bands, phase);
     double u = 0, v = 0;
     latlong_coordinates(texel.direction, &u, &v);
-    const double extent = texel.extent_rad / kPi;  // texels of a 2:1 map are square in u / 2 and v
-    const double dv = extent / cells.rows, du = extent / 2 / cells.columns;
-    const auto middle = [&](int row) { return v + dv * (row + 0.5 - 0.5 * cells.rows); };
-    double all = 0;
-    for (int j = 0; j < cells.rows; ++j) all += cells.columns * std::sin(kPi * middle(j));
-    for (int j = 0; j < cells.rows; ++j) {
-      const double sine = std::sin(kPi * middle(j));
-      // A cell's centre of mass lies a little towards the equator.
-      const double centre = middle(j) + kPi * dv * dv / 12 * std::cos(kPi * middle(j)) / sine;
+    const double du = texel.extent_rad / (2 * kPi) / cells.columns, half_turn = kPi * du;
+    for (const CellRow& row : rows_of(texel, cells)) {
+      const double twice = 2 * row.colatitude, h = row.height;
+      const double along = 0.5 * std::sin(twice) * std::sin(h);
+      const double out =
+          0.5 * (h - std::cos(twice) * std::sin(h)) * std::sin(half_turn) / half_turn;
+      const double centre = std::atan2(out, along) / kPi;
+      const double shrink =
+          std::hypot(out, along) / (2 * std::sin(row.colatitude) * std::sin(0.5 * h));
       for (int i = 0; i < cells.columns; ++i) {
         const Vec3d at = latlong_direction(u + du * (i + 0.5 - 0.5 * cells.columns), centre);
-        const double half_width = 0.5 * cells.width, half_height = 0.5 * cells.height;
+        const double half_width = 0.5 * row.width, half_height = 0.5 * h;
         const Vec3d across = normalize(Vec3d{at.z, 0, -at.x});
         x_.push_back(at.x);
         y_.push_back(at.y);
         z_.push_back(at.z);
-        cells_.push_back({texel.energy * (sine / all), across * half_width,
-                          cross(across, at) * half_height, half_width + half_height,
-                          1 - cells.side2() / 12});
+        cells_.push_back({texel.energy * (row.share / cells.columns), across * half_width,
+                          cross(across, at) * half_height, half_width + half_height, shrink});
       }
     }
   }
@@ -253,27 +277,43 @@ Vec3d CutLight::at(const Vec3d& direction) const {
 // both factors lie between -0.22 and 1. Reading the table loses another (l step)^2 / 8. Taken as if
 // all bright light E were one source, whose squared norm in band l is E^2 (2l+1) / (4 pi).
 //
-// The kernel is slope max(c, 0), whose bands are slope A_l and whose mean over a cell is exact, and
-// a rest of bands h_l - slope A_l, which falls as l^-3.5. The table holds all bands of the rest
-// beyond the limit and, negative, the kink's below it. Past the computed bands every other one is
-// left; past sixteen times as many, the sum is an integral.
+// At colatitude t a cell is not quite a rectangle: with k = cot t its sides are k of themselves a
+// radian longer towards the equator, and its parallels bend by k. Next to a pole it is a triangle,
+// k a = 2. About the centre of mass the density (1 + k y) / a has the variance a^2 (1 - (k a)^2 /
+// 12) / 12 and the third cumulant -k a^4 / 120, which a wave sees as l^2 (k a)^2 a^2 / 288 and l^3
+// k a^4 / 720; the bent parallels add l^3 k b^4 / 1900 at the most. Of a kink that crosses the cell
+// the mean moves by at most slope k a^2 / 120, and by less than slope k max(a, b)^2 / 100 with the
+// parallels'; it does so where |cos| is under (a + b) / 2, a share of as much of the sphere.
+//
+// The kernel is slope max(c, 0), whose bands are slope A_l and whose mean over a rectangle is
+// exact, and a rest of bands h_l - slope A_l, which falls as l^-3.5. The table holds all bands of
+// the rest beyond the limit and, negative, the kink's below it. Past the computed bands every other
+// one is left; past sixteen times as many, the sum is an integral.
 double cut_light_bound(const LightStatistics& light, const ZonalKernel& kernel,
                        const std::vector<double>& responses, int bands, double phase) {
   const double side2 = common_side2(light, bands, phase);
-  double second = 0, fourth = 0, all = 0;
+  double second = 0, third = 0, fourth = 0, bent = 0, all = 0;
   for (const BrightTexel& texel : light.bright) {
-    const Cells cells = cells_of(texel, bands, phase);
-    const double energy = luminance(texel.energy);
-    const double a2 = cells.height * cells.height, b2 = cells.width * cells.width;
-    second += energy * (std::abs(cells.side2() - side2) + std::abs(a2 - b2) / 2) / 24;
-    fourth += energy * std::max(a2, b2) * std::max(a2, b2) / 2560;
-    all += energy;
+    for (const CellRow& row : rows_of(texel, cells_of(texel, bands, phase))) {
+      const double energy = luminance(texel.energy) * row.share;
+      const double a2 = row.height * row.height, b2 = row.width * row.width;
+      const double side = std::max(row.height, row.width);
+      const double bend = std::min(2.0, side / std::abs(std::tan(row.colatitude)));
+      second += energy * (std::abs(row.side2() - side2) + std::abs(a2 - b2) / 2) / 24 +
+                energy * bend * bend * side * side / 288;
+      third += energy * bend * side * side * side / 500;
+      fourth += energy * std::max(a2, b2) * std::max(a2, b2) / 2560;
+      bent += energy * bend * side * std::sqrt(std::min(1.0, 0.5 * (row.height + row.width))) / 100;
+      all += energy;
+    }
   }
   const double step = kPi / (kTableStepsPerBand * double(bands));
   second = second / all + step * step / 8;
+  third /= all;
   fourth /= all;
   const auto term = [&](double l, double response) {
-    const double l2 = l * l, miss = std::min(1.22, l2 * second + l2 * l2 * fourth) * response;
+    const double l2 = l * l, part = l2 * (second + l * third + l2 * fourth);
+    const double miss = std::min(1.22, part) * response;
     return (2 * l + 1) * miss * miss;
   };
   double sum = 0, last = 0;
@@ -287,7 +327,11 @@ double cut_light_bound(const LightStatistics& light, const ZonalKernel& kernel,
   double l = count;
   for (; l < 16 * count; l += 2) sum += term(l, last * std::pow(l / count, -3.5));
   sum += 1.5 * last * last * std::pow(l / count, -7) * l * l / 5;
-  return light.bright_share * std::sqrt(sum);
+  // Errors count by the channel that errs the most, against the mean of all.
+  Vec3d energy;
+  for (const BrightTexel& texel : light.bright) energy += texel.energy;
+  const double share = std::max({energy.x, energy.y, energy.z}) / (4 * kPi * light.mean_luminance);
+  return share * (std::sqrt(sum) + 4 * kPi * kernel.horizon_slope() * bent / all);
 }
 
 double cut_light_phase(const LightStatistics& light, const ZonalKernel& kernel,

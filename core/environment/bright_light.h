@@ -27,7 +27,7 @@ class CutLight {
     Vec3d energy;
     Vec3d across, down;  // half the sides, along longitude and colatitude
     double reach;        // no corner is farther
-    double shrink;       // of the mean of a cosine over the cell, 1 - (a^2 + b^2) / 24
+    double shrink;       // of the mean of a cosine over the cell: its mean direction's length
   };
   std::vector<double> x_, y_, z_;  // directions of the cells' middles
   std::vector<Cell> cells_;

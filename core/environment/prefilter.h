@@ -35,8 +35,9 @@ struct LobePlan {
   // The truth lies in the map's range, so that results are cut back into it.
   bool within_range = true;
 };
-// The fewest bands whose bound stays at or under `target` (relative rms). Where no allowed number
-// does, the most are taken, and error_bound, then above `target`, says what that gives.
+// The fewest bands whose bound stays at or under `target` (relative rms), what single precision
+// takes aside. Where no allowed number does, the most are taken, and error_bound, then above
+// `target`, says what that gives.
 inline constexpr int kMaxBands = 1400;
 // GGX lobes that would need more bands than these, or than a halo of this map, are split. Charlie's
 // ring cannot be; it makes do with the bands that kDearTargets times the target takes, since time

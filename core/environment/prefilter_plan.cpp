@@ -44,6 +44,8 @@ int first_under(const std::vector<double>& tails, double limit) {
 // What summing the map's rows may add to a level.
 constexpr double kRowShare = 0.02;  // of the target
 
+constexpr double kSingle = 6e-8;  // what single precision may take off a value
+
 struct BandChoice {
   int bands = 0;
   bool corrected = false;
@@ -77,6 +79,24 @@ double interpolation_bound(const LightStatistics& light, const std::vector<doubl
   return largest * light.spread;
 }
 
+// The norm of a level, relative to the mean: by Parseval at most that of the map, and by Young's
+// inequality at most that of its kernel, here squared, since the map is nowhere negative: the
+// narrowest of suns cannot make more of a broad lobe.
+double largest_norm(const LightStatistics& light, double kernel_squared) {
+  const double mean = std::max({light.mean.x, light.mean.y, light.mean.z}) / light.mean_luminance;
+  return std::min(std::hypot(mean, light.spread), mean * std::sqrt(kernel_squared));
+}
+
+// Points of the grid are kept, and interpolated from eight by eight, in single precision: 2e-7 of
+// them at the most (measured: 1.5e-7). A kernel's squared norm is the sum of (2l + 1) h_l^2.
+double rounding_bound(const LightStatistics& light, const std::vector<double>& responses) {
+  constexpr double kRounding = 2e-7;
+  double squares = 0;
+  for (size_t l = 0; l < responses.size(); ++l)
+    squares += (2 * static_cast<double>(l) + 1) * responses[l] * responses[l];
+  return kRounding * largest_norm(light, squares);
+}
+
 // A lobe's core is left to the map's texels where its bands would be more than these: as many as
 // balance a transform's cubes of bands against the texels that a core then covers.
 int halo_bands(const LightStatistics& light) {
@@ -100,8 +120,12 @@ LobePlan plan_split(const LightStatistics& light, const Lobe& lobe, double targe
   plan.row_error = kRowShare * target;
   const double norm = NearField::kNormFactor * (1 + light.spread);
   plan.tolerance = std::clamp(0.4 * target / norm, kSmallestTolerance, NearField::kWorstTolerance);
+  // What near_field adds is rounded once, with the level itself.
+  const double peak = GgxLobe(lobe.alpha).at_angle(0);
   plan.error_bound = cut + interpolation_bound(light, responses, plan.bands) +
-                     norm * plan.tolerance + plan.row_error;
+                     norm * plan.tolerance + plan.row_error +
+                     rounding_bound(light, plan.responses) +
+                     kSingle * largest_norm(light, 4 * kPi * peak);
   plan.uncorrected_bound = plan.error_bound;
   return plan;
 }
@@ -163,8 +187,9 @@ LobePlan plan_banded(const LightStatistics& light, const Lobe& lobe, double targ
   plan.cell_phase = phase;
   plan.row_error = kRowShare * target;
   plan.responses.assign(responses.begin(), responses.begin() + choice.bands);
-  plan.error_bound = total_bound(choice.corrected);
-  plan.uncorrected_bound = total_bound(false);
+  const double rounding = rounding_bound(light, responses);
+  plan.error_bound = total_bound(choice.corrected) + rounding;
+  plan.uncorrected_bound = total_bound(false) + rounding;
   return plan;
 }
 
@@ -184,8 +209,9 @@ LobePlan plan_irradiance_bands(const LightStatistics& light, int bands, double t
   plan.bands = bands;
   for (int l = 0; l < bands; ++l) plan.responses.push_back(clamped_cosine_band(l) / kPi);
   plan.row_error = kRowShare * target;
-  plan.error_bound = plan.uncorrected_bound =
-      interpolation_bound(light, plan.responses, bands) + plan.row_error;
+  plan.error_bound = plan.uncorrected_bound = interpolation_bound(light, plan.responses, bands) +
+                                              plan.row_error +
+                                              rounding_bound(light, plan.responses);
   plan.within_range = false;
   return plan;
 }
