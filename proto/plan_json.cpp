@@ -46,6 +46,8 @@ constexpr auto kCounterMembers = [](auto& counters, const auto& visit) {
   visit("filter_calls", counters.filter_calls);
   visit("texture_reads", counters.texture_reads);
   visit("environment_reads", counters.environment_reads);
+  visit("projected_texels", counters.projected_texels);
+  visit("cube_texels", counters.cube_texels);
 };
 
 // A chunk's round keeps the sum, so that sums over chunks are exact.

@@ -67,7 +67,7 @@ namespace {
 Effect variation_effect(EnvironmentMapsState& state) {
   if (state.light.constant()) {
     return {"environment_variation", false,
-            "Every texel is equal: all light outputs are that value in closed form.", 0};
+            "Every texel is equal: all outputs of its radiance are that value in closed form.", 0};
   }
   for (const MapsProduct& product : maps_products()) {
     if (!product.depends_on_light || !product.ordered(state.parameters())) continue;
@@ -304,6 +304,7 @@ ChunkResult environment_maps_chunk(EnvironmentMapsState& state, const Plan& plan
   ByteWriter writer;
   Round round;
   std::vector<MeasuredError> all_measured;
+  state.light.counters() = {};
   for (uint64_t element = range.first; element < range.first + range.count; ++element) {
     progress.check();
     const MapsOutput& output = *state.outputs[static_cast<size_t>(element)];
@@ -320,6 +321,7 @@ ChunkResult environment_maps_chunk(EnvironmentMapsState& state, const Plan& plan
   }
   for (const MeasuredError& measured : all_measured) write_measured(measured, writer);
   result.bytes = writer.take();
+  result.report.counters = state.light.counters();
   result.report.elements = round.elements = range.count;
   result.report.wall_s = round.wall_s = wall_seconds() - start_s;
   result.report.cpu_s = round.cpu_s = process_cpu_seconds() - start_cpu_s;

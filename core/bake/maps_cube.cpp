@@ -63,6 +63,7 @@ double ConvolvedCube::model_seconds(MapsLight& light) const {
 }
 
 Image ConvolvedCube::make_cube(MapsLight& light, Progress& progress) const {
+  if (!constant_) light.counters().cube_texels += 6 * uint64_t(size_) * uint64_t(size_);
   if (turned_) {
     return turn_to_cube(light.environment(), *turned_, size_, light.threads(), progress);
   }

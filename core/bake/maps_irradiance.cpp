@@ -106,6 +106,7 @@ class BandedIrradianceCube : public MapsOutput {
       const Vec3 value = to_float(light.environment().mean * kPi);
       for (size_t i = 0; i < cube.pixels.size(); i += 3) std::copy_n(&value.x, 3, &cube.pixels[i]);
     } else {
+      light.counters().cube_texels += cube.pixels.size() / 3;
       const LatlongSpectrum& spectrum = light.spectrum(progress);
       cube = convolve_lobe(light.environment(), light.statistics(), spectrum, plan_, size_,
                            light.threads(), progress);

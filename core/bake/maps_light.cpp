@@ -43,6 +43,7 @@ int MapsLight::row_points() const {
 const LatlongSpectrum& MapsLight::spectrum(Progress& progress) {
   if (!spectrum_) {
     spectrum_ = project_for(environment_, lobes_, sh_, threads_, progress);
+    counters_.projected_texels += environment_.radiance.pixels.size() / 3;
   }
   return *spectrum_;
 }

@@ -10,6 +10,7 @@
 #include "core/environment/layout_convert.h"
 #include "core/environment/prefilter.h"
 #include "core/environment/sun_extraction.h"
+#include "core/trace/tracer.h"
 
 namespace lightkiln {
 
@@ -43,10 +44,14 @@ class MapsLight {
   int row_points() const;
   const LatlongSpectrum& spectrum(Progress& progress);
 
+  // What outputs cost the map; outputs count their own work, and whoever bakes them takes it.
+  RayCounters& counters() { return counters_; }
+
  private:
   Environment environment_;
   std::optional<SunExtraction> sun_;
   int threads_;
+  RayCounters counters_;
   std::optional<LightStatistics> statistics_;
   std::unique_ptr<const ConversionSource> conversion_source_;
   ShNeed sh_;

@@ -38,7 +38,8 @@ MapLayout source_layout(const DecodedImage& decoded, const SourceReading& readin
     refuse(image,
            "a lat-long map covers the whole sphere and is exactly twice as wide as high. Other "
            "layouts are named by parameters.source.layout: cube_strip (N x 6N), horizontal_cross "
-           "(4N x 3N), vertical_cross (3N x 4N), cylinder (any shape), or one of the squares "
+           "(4N x 3N), vertical_cross (3N x 4N), cylinder and cylinder_equal_area (an even number "
+           "of texels wide), or one of the squares "
            "angular, mirror_ball, octahedral, equal_area_octahedral, hemisphere, "
            "hemisphere_equal_area.");
   }

@@ -14,6 +14,8 @@ RayCounters& RayCounters::operator+=(const RayCounters& other) {
   texture_reads += other.texture_reads;
   environment_reads += other.environment_reads;
   point_queries += other.point_queries;
+  projected_texels += other.projected_texels;
+  cube_texels += other.cube_texels;
   return *this;
 }
 

@@ -51,6 +51,10 @@ struct RayCounters {
   uint64_t texture_reads = 0;
   uint64_t environment_reads = 0;
   uint64_t point_queries = 0;
+  // Of environment maps, which trace nothing: texels of the map that were projected to harmonics,
+  // and texels of cubes that were convolved or resampled.
+  uint64_t projected_texels = 0;
+  uint64_t cube_texels = 0;
   RayCounters& operator+=(const RayCounters& other);
 };
 

@@ -69,6 +69,8 @@ TEST(EnvironmentMaps, BakesAWhiteFurnaceToExactlyOne) {
   EXPECT_NEAR(document.sh->sh.coefficients[0].x, 2 * std::sqrt(kPi), 1e-14);
   for (size_t i = 1; i < 25; ++i) EXPECT_EQ(document.sh->sh.coefficients[i], Vec3d{});
   EXPECT_EQ(result.accuracy.status, AccuracyStatus::exact);
+  EXPECT_EQ(result.accuracy.counters.projected_texels, 0u);
+  EXPECT_EQ(result.accuracy.counters.cube_texels, 0u);
 }
 
 // The furnace of the general path: one texel off by a hair switches the closed form off.
@@ -86,6 +88,8 @@ TEST(EnvironmentMaps, ChangesNothingWhenTheClosedFormIsOff) {
   for (const float v : image_of(result, "irradiance.exr").pixels) {
     ASSERT_NEAR(v, static_cast<float>(kPi), 1e-5f);
   }
+  EXPECT_EQ(result.accuracy.counters.projected_texels, 32u * 16);
+  EXPECT_GT(result.accuracy.counters.cube_texels, 0u);
 }
 
 TEST(EnvironmentMaps, MakesOnlyWhatIsOrdered) {
@@ -99,6 +103,13 @@ TEST(EnvironmentMaps, MakesOnlyWhatIsOrdered) {
   EXPECT_TRUE(document_of(result).prefilter.empty());
   EXPECT_FALSE(document_of(result).irradiance.has_value());
   EXPECT_TRUE(effect_of(plan, "sh").active);
+  // Nine coefficients pass over the map once and build no cube.
+  EXPECT_EQ(result.accuracy.counters.projected_texels, 32u * 16);
+  EXPECT_EQ(result.accuracy.counters.cube_texels, 0u);
+  parameters.prefilter = PrefilterOutput{8, 2};
+  const Assembly more = bake(order(parameters), exr_of(reference::test_sky(16, 10)));
+  EXPECT_EQ(more.accuracy.counters.projected_texels, 32u * 16);
+  EXPECT_EQ(more.accuracy.counters.cube_texels, 6u * (64 + 16));
   for (const char* name : {"irradiance", "prefilter", "dfg", "bright_texels"}) {
     EXPECT_FALSE(effect_of(plan, name).active) << name;
     EXPECT_FALSE(effect_of(plan, name).reason.empty()) << name;

@@ -94,6 +94,8 @@ TEST(ChunkReportJson, RoundTripsToTheLastBit) {
           {whole(), whole(), whole(), finite(), finite(), finite(), finite(), whole()});
     report.counters.shadow_rays = whole();
     report.counters.environment_reads = whole();
+    report.counters.projected_texels = whole();
+    report.counters.cube_texels = whole();
     report.cpu_s = finite();
     report.suspicious = whole();
     const ChunkReport back = read_chunk_report(write_chunk_report(report));
