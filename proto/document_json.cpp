@@ -25,8 +25,7 @@ void write_axes(JsonWriter& writer) {
       .member("length_unit", "world units of the scene");
 }
 
-void write_radiance_convention(JsonWriter& writer,
-                               FaceOrientation faces = FaceOrientation::openexr) {
+void write_radiance_convention(JsonWriter& writer, FaceOrientation faces) {
   writer.key("convention")
       .begin_object()
       .member("basis", "real spherical harmonics, orthonormal, polar axis +Z")
@@ -301,7 +300,7 @@ void write_environment(JsonWriter& writer, const EnvironmentDocument& document) 
 }
 
 void write_probes(JsonWriter& writer, const ProbesDocument& document) {
-  write_radiance_convention(writer);
+  write_radiance_convention(writer, document.faces);
   writer.member("cubemap_size", document.cubemap_size).key("probes").begin_array();
   for (const ProbeDocument& probe : document.probes) {
     writer.begin_object()

@@ -106,6 +106,24 @@ ParameterGroup rotation_group() {
           nullptr};
 }
 
+template <typename T>
+ParameterGroup cubes_group(std::string_view meaning) {
+  return {"/parameters/cubes",
+          {{"face_orientation",
+            NameMember{{"openexr", "opengl"},
+                       [](const Spec& s) {
+                         return static_cast<size_t>(parameters<T>(s).cubes.face_orientation);
+                       },
+                       [](Spec& s, size_t i) {
+                         parameters<T>(s).cubes.face_orientation = FaceOrientation(i);
+                       }},
+            {},
+            false,
+            meaning}},
+          [](const Spec& s) { return !(parameters<T>(s).cubes == CubeParameters{}); },
+          nullptr};
+}
+
 template <size_t Product>
 LayoutOutput& output(Spec& spec) {
   return *parameters<Maps>(spec).layouts[Product];
@@ -208,23 +226,17 @@ ParameterGroup probes_rotation_group() {
 }
 
 ParameterGroup maps_cubes_group() {
-  return {"/parameters/cubes",
-          {{"face_orientation",
-            NameMember{{"openexr", "opengl"},
-                       [](const Spec& s) {
-                         return static_cast<size_t>(parameters<Maps>(s).cubes.face_orientation);
-                       },
-                       [](Spec& s, size_t i) {
-                         parameters<Maps>(s).cubes.face_orientation = FaceOrientation(i);
-                       }},
-            {},
-            false,
-            "How the faces of every cube are written: under layouts, of prefilter, sheen and "
-            "irradiance. openexr: as OpenEXR's cube. opengl: as OpenGL, Direct3D, Vulkan and "
-            "engines on them look up, whose world is (-x, y, z); px then shows what lies at -X of "
-            "ours. Crosses are the same in either."}},
-          [](const Spec& s) { return !(parameters<Maps>(s).cubes == CubeParameters{}); },
-          nullptr};
+  return cubes_group<EnvironmentMapsParameters>(
+      "How the faces of every cube are written: under layouts, of prefilter, sheen and irradiance. "
+      "openexr: as OpenEXR's cube. opengl: as OpenGL, Direct3D, Vulkan and engines on them look "
+      "up, whose world is (-x, y, z); px then shows what lies at -X of ours. Crosses are the same "
+      "in either.");
+}
+ParameterGroup probes_cubes_group() {
+  return cubes_group<ProbesParameters>(
+      "How the faces of both cubes of a probe are written. openexr: as OpenEXR's cube. opengl: as "
+      "OpenGL, Direct3D, Vulkan and engines on them look up, whose world is (-x, y, z); +X then "
+      "shows what lies at -X of ours.");
 }
 
 std::vector<ParameterGroup> layout_groups() {

@@ -13,8 +13,9 @@ ParameterGroup maps_source_group();
 ParameterGroup probes_source_group();
 ParameterGroup maps_rotation_group();
 ParameterGroup probes_rotation_group();
-// How environment_maps writes cubes.
+// How cubes are written.
 ParameterGroup maps_cubes_group();
+ParameterGroup probes_cubes_group();
 // The object of all layouts, then each of them.
 std::vector<ParameterGroup> layout_groups();
 

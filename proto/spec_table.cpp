@@ -299,6 +299,7 @@ KindTable probes_table() {
          "error."}}});
   groups.push_back(probes_source_group());
   groups.push_back(probes_rotation_group());
+  groups.push_back(probes_cubes_group());
   groups.push_back({"/parameters/cubemap",
                     {{"size",
                       +[](Spec& s) -> int& { return parameters<Probes>(s).cubemap.size; },

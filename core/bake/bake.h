@@ -219,6 +219,7 @@ struct ProbeDocument {
 struct ProbesDocument {
   std::vector<ProbeDocument> probes;
   int cubemap_size = 0;
+  FaceOrientation faces = FaceOrientation::openexr;  // of every cube
 };
 
 struct Assembly {

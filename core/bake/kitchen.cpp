@@ -129,6 +129,21 @@ void add_mip_mapped_image(const std::string& name, std::span<const Image> levels
   add_exr(name, levels.front(), write_exr_mipmapped(levels, options), assembly);
 }
 
+std::string describe_strip(FaceOrientation faces) {
+  return std::string("cube: six faces from the top, +X -X +Y -Y +Z -Z") +
+         (faces == FaceOrientation::opengl ? " of the world (-x, y, z), as OpenGL looks them up"
+                                           : ", as OpenEXR orients them");
+}
+
+Image ordered_faces(Image strip, FaceOrientation faces) {
+  return faces == FaceOrientation::opengl ? strip_to_opengl(strip) : std::move(strip);
+}
+
+void tell_faces(FaceOrientation faces, std::map<std::string, std::string>* attributes) {
+  if (faces == FaceOrientation::openexr) return;
+  (*attributes)[kFaceOrientationAttribute] = face_orientation_name(faces);
+}
+
 static_assert(std::endian::native == std::endian::little,
               "chunk bytes are written as they lie in memory");
 

@@ -37,6 +37,13 @@ void add_image(const std::string& name, const Image& image, const ExrWriteOption
 void add_mip_mapped_image(const std::string& name, std::span<const Image> levels,
                           const ExrWriteOptions& options, Assembly* assembly);
 
+// Of a strip of faces, for its text attribute.
+std::string describe_strip(FaceOrientation faces);
+// A strip of faces, made in our orientation, as the order has it filed.
+Image ordered_faces(Image strip, FaceOrientation faces);
+// Adds to the text attributes of a file of faces what is to be said of their orientation.
+void tell_faces(FaceOrientation faces, std::map<std::string, std::string>* attributes);
+
 // One pointer-free serialisation for chunk bytes: little-endian, in call order.
 class ByteWriter {
  public:

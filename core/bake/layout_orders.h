@@ -50,9 +50,9 @@ Rotation rotation_of(const RotationParameters& parameters);
 
 // How every cube of an order is written.
 struct CubeParameters {
-  // Of cube_strip, cube_faces and crosses under layouts, prefilter, sheen and irradiance. Texels
-  // are moved, at no cost worth telling; crosses are the same picture in either. opengl is refused
-  // where no cube is ordered.
+  // Of cube_strip, cube_faces and crosses under layouts, prefilter, sheen and irradiance; of both
+  // cubes of a probe. Texels are moved, at no cost worth telling; crosses are the same picture in
+  // either. opengl is refused where no cube is ordered.
   FaceOrientation face_orientation = FaceOrientation::openexr;
 
   friend bool operator==(const CubeParameters&, const CubeParameters&) = default;

@@ -114,21 +114,6 @@ ExrWriteOptions cube_options(std::map<std::string, std::string> attributes,
 
 }  // namespace
 
-std::string describe_strip(FaceOrientation faces) {
-  return std::string("cube: six faces from the top, +X -X +Y -Y +Z -Z") +
-         (faces == FaceOrientation::opengl ? " of the world (-x, y, z), as OpenGL looks them up"
-                                           : ", as OpenEXR orients them");
-}
-
-Image ordered_faces(Image strip, FaceOrientation faces) {
-  return faces == FaceOrientation::opengl ? strip_to_opengl(strip) : std::move(strip);
-}
-
-void tell_faces(FaceOrientation faces, std::map<std::string, std::string>* attributes) {
-  if (faces == FaceOrientation::openexr) return;
-  (*attributes)[kFaceOrientationAttribute] = face_orientation_name(faces);
-}
-
 void add_cube(const std::string& name, Image cube, std::map<std::string, std::string> attributes,
               MapsResult* result) {
   add_image(name, ordered_faces(std::move(cube), result->faces),

@@ -112,13 +112,6 @@ class ErrorMeter {
 void judge_output(double bound, const MeasuredError& measured, double target, ChunkReport* report,
                   Round* round);
 
-// Of a strip of faces, for its text attribute.
-std::string describe_strip(FaceOrientation faces);
-// A strip of faces, made in our orientation, as the order has it filed.
-Image ordered_faces(Image strip, FaceOrientation faces);
-// Adds to the text attributes of a file of faces what is to be said of their orientation.
-void tell_faces(FaceOrientation faces, std::map<std::string, std::string>* attributes);
-
 // Adds a cube as six faces in one strip, turned as ordered, with text attributes saying so.
 void add_cube(const std::string& name, Image cube, std::map<std::string, std::string> attributes,
               MapsResult* result);

@@ -21,10 +21,12 @@ std::unique_ptr<ProbesState, ProbesStateDeleter> probes_open(const Spec& spec, c
   state->grants = grants;
   state->scene = load_gltf(gltf_source(*spec.scene, inputs), {});
   if (spec.environment) {
-    state->environment = make_environment(
-        decode_environment(*spec.environment, inputs),
-        environment_reading(*spec.environment, std::get<ProbesParameters>(spec.parameters).source),
-        rotation_of(std::get<ProbesParameters>(spec.parameters).rotation), grants.threads);
+    const ProbesParameters& parameters = state->parameters();
+    DecodedImage decoded = decode_environment(*spec.environment, inputs);
+    state->warnings = source_warnings(*spec.environment, inputs, parameters.source, decoded);
+    state->environment = make_environment(std::move(decoded),
+                                          environment_reading(*spec.environment, parameters.source),
+                                          rotation_of(parameters.rotation), grants.threads);
   }
   state->survey = survey_light(state->scene, state->light());
   TracerOptions options;

@@ -21,13 +21,19 @@ std::string artifact_name(uint64_t probe, const char* what) {
 
 // The cube's texel centres lie at (i + 1/2)/N, not on the borders as the standard attribute
 // `envmap` says, so the layout is told in words of our own.
-std::map<std::string, std::string> attributes(const Vec3d& position, const char* quantity) {
+std::map<std::string, std::string> attributes(const Vec3d& position, const char* quantity,
+                                              FaceOrientation faces) {
   char place[96];
   std::snprintf(place, sizeof place, "%.17g %.17g %.17g", position.x, position.y, position.z);
-  return {{"lightkiln.layout", "cube: +X -X +Y -Y +Z -Z from top to bottom"},
-          {"lightkiln.position", place},
-          {"lightkiln.quantity", quantity},
-          {"lightkiln.texel_convention", "half_texel"}};
+  std::map<std::string, std::string> words = {
+      {"lightkiln.layout", faces == FaceOrientation::openexr
+                               ? "cube: +X -X +Y -Y +Z -Z from top to bottom"
+                               : describe_strip(faces)},
+      {"lightkiln.position", place},
+      {"lightkiln.quantity", quantity},
+      {"lightkiln.texel_convention", "half_texel"}};
+  tell_faces(faces, &words);
+  return words;
 }
 
 ExrWriteOptions options_of(ExrPixelType type, int threads,
@@ -78,6 +84,7 @@ Assembly probes_assemble(ProbesState& state, const Plan& plan, std::span<const C
   Assembly assembly;
   ProbesDocument document;
   document.cubemap_size = parameters.cubemap.size;
+  const FaceOrientation faces = document.faces = parameters.cubes.face_orientation;
   std::vector<ChunkReport> reports;
   for (size_t i = 0; i < chunks.size(); ++i) {
     ByteReader reader(chunks[i].bytes);
@@ -87,13 +94,16 @@ Assembly probes_assemble(ProbesState& state, const Plan& plan, std::span<const C
       document.probes.push_back(describe(result, position));
       const ProbeDocument& described = document.probes.back();
       const int size = parameters.cubemap.size, threads = state.grants.threads;
-      add_image(described.radiance_artifact, stacked_cube(size, 3, std::move(result.radiance)),
-                options_of(type, threads, attributes(position, "radiance")), &assembly);
+      add_image(described.radiance_artifact,
+                ordered_faces(stacked_cube(size, 3, std::move(result.radiance)), faces),
+                options_of(type, threads, attributes(position, "radiance", faces)), &assembly);
       add_image(
-          described.distance_artifact, stacked_cube(size, 1, std::move(result.distance)),
-          options_of(ExrPixelType::float32, threads,
-                     attributes(position,
-                                "distance to the nearest surface, world units; 0 = nothing hit")),
+          described.distance_artifact,
+          ordered_faces(stacked_cube(size, 1, std::move(result.distance)), faces),
+          options_of(
+              ExrPixelType::float32, threads,
+              attributes(position, "distance to the nearest surface, world units; 0 = nothing hit",
+                         faces)),
           &assembly);
       progress.update(static_cast<double>(document.probes.size()) /
                       static_cast<double>(plan.elements));

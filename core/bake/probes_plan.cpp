@@ -96,6 +96,7 @@ Plan probes_plan(ProbesState& state, Progress& progress) {
   plan.elements = state.parameters().positions.size();
   plan.element_unit = "probe";
   add_scene_report(state.scene.report, &plan);
+  plan.warnings.insert(plan.warnings.end(), state.warnings.begin(), state.warnings.end());
   if (state.environment) {
     const PixelRepairs& repairs = state.environment->repairs;
     if (repairs.nan > 0) plan.repairs.emplace_back("environment_nan_values", repairs.nan);

@@ -19,6 +19,7 @@ struct ProbesState {
   Grants grants;
   Scene scene;
   std::optional<Environment> environment;
+  std::vector<std::string> warnings;  // of the environment's files
   LightSurvey survey;
   std::unique_ptr<Tracer> tracer;
   std::unique_ptr<RadianceScene> radiance;  // of the selection asked for last

@@ -148,6 +148,7 @@ struct ProbesParameters {
   // World units, 1..10000 positions; fewer where cubes are large: see kMostProbeBytes.
   std::vector<Vec3d> positions;
   CubemapOutput cubemap;
+  CubeParameters cubes;
   ProbeShOutput sh;
   // Diffuse bounces, 0..64: 0 = only light that surfaces emit or the environment sends directly to
   // the probe. None = the fewest whose truncation bound stays under half the ordered error.

@@ -143,6 +143,53 @@ TEST(ProbesJob, SameOrderSameBytes) {
   }
 }
 
+// A probe beside a wall, so that no two faces are alike.
+TEST(ProbesJob, WritesItsCubesAsGraphicsInterfacesLookThemUp) {
+  Job job;
+  auto& parameters = std::get<ProbesParameters>(job.spec.parameters);
+  parameters.positions = {{2, 6, 10}};
+  const Assembly ours = job.bake();
+  parameters.cubes.face_orientation = FaceOrientation::opengl;
+  EXPECT_TRUE(validate(job.spec).empty());
+  const Assembly theirs = job.bake();
+  EXPECT_EQ(std::get<ProbesDocument>(ours.document).faces, FaceOrientation::openexr);
+  EXPECT_EQ(std::get<ProbesDocument>(theirs.document).faces, FaceOrientation::opengl);
+  ASSERT_EQ(theirs.artifacts.size(), 2u);
+  for (size_t i = 0; i < 2; ++i) {
+    const auto &a = ours.artifacts[i].bytes, &b = theirs.artifacts[i].bytes;
+    EXPECT_EQ(strip_to_opengl(read_exr(a).image).pixels, read_exr(b).image.pixels);
+    EXPECT_EQ(exr_text(a, kFaceOrientationAttribute), "");
+    EXPECT_EQ(exr_text(b, kFaceOrientationAttribute), "opengl");
+    EXPECT_EQ(read_exr(b).envmap, EnvmapAttribute::none);
+  }
+  // The nearest wall, 1 m away at -X of ours, is ahead of +X of theirs.
+  const Image distance = read_exr(theirs.artifacts[1].bytes).image;
+  EXPECT_NEAR(*distance.at(1, 1), 1, 0.2);
+  EXPECT_GT(*distance.at(1, 5), 6);
+}
+
+TEST(ProbesJob, WarnsOfAnEnvironmentThatIsNotWhatItIsReadAs) {
+  Job job;
+  auto& parameters = std::get<ProbesParameters>(job.spec.parameters);
+  parameters.source.layout = LayoutKind::cube_strip;
+  ExrWriteOptions options;
+  options.attributes[kFaceOrientationAttribute] = "opengl";
+  const std::vector<std::byte> sky = write_exr(Image(4, 24, 3), options);
+  const std::string digest = "sha256:" + std::string(64, 'b');
+  job.spec.environment = InputRef{digest, {}};
+  const Inputs inputs{{{kDigest, job.glb}, {digest, sky}}};
+  const auto warnings = [&] {
+    Progress progress;
+    std::vector<std::string> all = Bake(job.spec, inputs, {1, 0, 4}).plan(progress).warnings;
+    return std::count_if(all.begin(), all.end(), [](const std::string& warning) {
+      return warning.find("turned as opengl") != std::string::npos;
+    });
+  };
+  EXPECT_EQ(warnings(), 1);
+  parameters.source.face_orientation = FaceOrientation::opengl;
+  EXPECT_EQ(warnings(), 0);
+}
+
 // Power-of-two scales change exponents only.
 TEST(ProbesJob, ScaleOfTheWorldLeavesRadianceAlone) {
   Job job;

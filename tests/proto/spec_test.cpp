@@ -175,6 +175,15 @@ TEST(SpecJson, TakesHowCubesAreWritten) {
   EXPECT_EQ(told(R"("irradiance":{},"cubes":{"orientation":"opengl"})"),
             Told{"/parameters/cubes/orientation unknown"});
   EXPECT_EQ(told(R"("irradiance":{},"cubes":"opengl")"), Told{"/parameters/cubes type"});
+
+  const auto probes = parse_spec(
+      R"({"kind":"probes","inputs":{"scene":)" + kA +
+      R"(},"parameters":{"positions":[[0,0,0]],"cubes":{"face_orientation":"opengl"}}})");
+  ASSERT_TRUE(probes.faults.empty()) << probes.faults[0].message;
+  EXPECT_EQ(std::get<ProbesParameters>(probes.spec.parameters).cubes.face_orientation,
+            FaceOrientation::opengl);
+  EXPECT_EQ(canonical_spec(parse_spec(canonical_spec(probes.spec)).spec),
+            canonical_spec(probes.spec));
 }
 
 TEST(SpecJson, TakesTheSameWindowsForProbesAndAssets) {
@@ -337,6 +346,7 @@ Spec random_spec() {
       probes.positions.push_back({positive(), -positive(), positive()});
     if (*rc::gen::arbitrary<bool>()) probes.max_bounces = *rc::gen::inRange(0, 65);
     probes.sh.window = ShWindow(*rc::gen::inRange(0, 4));
+    probes.cubes.face_orientation = FaceOrientation(*rc::gen::inRange(0, 2));
   }
   return spec;
 }
