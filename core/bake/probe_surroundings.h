@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/bake/bake.h"
+#include "core/bake/documents.h"
 #include "core/base/random.h"
 #include "core/trace/tracer.h"
 

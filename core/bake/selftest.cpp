@@ -1,7 +1,7 @@
 // Six directions that no mirror, axis swap or sign of a basis function leaves all alone: the three
 // positive axes and three oblique ones of unequal components.
 
-#include "core/bake/bake.h"
+#include "core/bake/documents.h"
 
 namespace lightkiln {
 
