@@ -212,7 +212,9 @@ MeasuredError check_layout(const ConversionSource& source, const MapLayout& layo
   for (int i = 0; i < 8 * check_texels && texels.size() < static_cast<size_t>(check_texels); ++i) {
     const size_t index = check_index(i, all);
     const int x = static_cast<int>(index % width), y = static_cast<int>(index / width);
-    if (texel_has_direction(layout, x, y)) texels.push_back({x, y, {}});
+    const bool known = std::any_of(texels.begin(), texels.end(),
+                                   [&](const Texel& t) { return t.x == x && t.y == y; });
+    if (!known && texel_has_direction(layout, x, y)) texels.push_back({x, y, {}});
   }
   parallel_blocks(
       texels.size(), 1, threads, progress,

@@ -141,7 +141,7 @@ Image convert_layout(const MapLayout& from, const Image& source, const MapLayout
 
 ConversionWork estimate_conversion(const ConversionSource& source, const MapLayout& to,
                                    const Rotation& rotation, MapFilter filter, double error) {
-  constexpr int kTexels = 256;
+  constexpr int kTexels = 256, kFewest = 8;
   ConversionWork work;
   if (moves_texels(source.layout, to, rotation)) return work;
   const ConversionTask task = make_conversion(source, to, rotation, filter, error);
@@ -152,20 +152,29 @@ ConversionWork estimate_conversion(const ConversionSource& source, const MapLayo
     work.walked = true;
     return work;
   }
-  // Spread by the fractions of a plastic number, which fill a square evenly at any count.
   TexelGatherer gatherer(task);
   int sampled = 0;
-  for (int i = 0; i < 4 * kTexels && sampled < kTexels; ++i) {
-    const double u = 0.5 + i * 0.7548776662466927, v = 0.5 + i * 0.5698402909980532;
-    const int x = static_cast<int>((u - std::floor(u)) * to.width);
-    const int y = static_cast<int>((v - std::floor(v)) * to.height);
-    if (size > 0 && !texel_has_direction(to, x, y)) continue;
+  const auto sample = [&](int x, int y) {
+    if (size > 0 && !texel_has_direction(to, x, y)) return;
     const TargetBlock block = block_of(to, x, y);
     GatheredLight light;
     gatherer.add_texel(locate_corners(task, texel_cell(to, block, x, y, {})), &light);
     ++sampled;
+  };
+  // The fewer texels a target has, the more of the source each one shows: a quarter of them takes a
+  // quarter of the conversion.
+  const int wanted = std::clamp(static_cast<int>(texels / 4), kFewest, kTexels);
+  if (texels <= wanted) {
+    for (int i = 0; i < to.width * to.height; ++i) sample(i % to.width, i / to.width);
+  }
+  // Spread by the fractions of a plastic number, which fill a square evenly at any count.
+  for (int i = 0; i < 4 * wanted && sampled < std::min<double>(wanted, texels); ++i) {
+    const double u = 0.5 + i * 0.7548776662466927, v = 0.5 + i * 0.5698402909980532;
+    sample(static_cast<int>((u - std::floor(u)) * to.width),
+           static_cast<int>((v - std::floor(v)) * to.height));
   }
   work = gatherer.work();
+  work.looked_at = sampled;
   const double scale = texels / sampled;
   for (double* count : {&work.texels, &work.places, &work.polygons, &work.covered, &work.points}) {
     *count *= scale;

@@ -56,8 +56,9 @@ struct ConversionWork {
   double covered = 0;   // texels under them
   double points = 0;    // interpolated
   bool walked = false;  // in closed form, by resample_to_cube()
+  int looked_at = 0;    // texels that this was estimated from
 };
-// Estimated from a few hundred texels.
+// Estimated from a few hundred texels, or a quarter of few.
 ConversionWork estimate_conversion(const ConversionSource& source, const MapLayout& to,
                                    const Rotation& rotation, MapFilter filter, double error);
 

@@ -387,6 +387,24 @@ TEST(ConvertLayout, RefusesImagesThatAreNotTheirLayout) {
   EXPECT_THROW(attempt(Image(16, 8, 3), ball), Error);
 }
 
+// A texel of a small target shows much of the source: planning must not cost what baking does many
+// times over.
+TEST(ConvertLayout, EstimatesSmallTargetsFromFewTexels) {
+  const MapLayout map = make_layout(LayoutKind::latlong, 64);
+  const Image image = paint(map, light);
+  const ConversionSource source(map, image);
+  const auto looked_at = [&](LayoutKind kind, int size) {
+    return estimate_conversion(source, make_layout(kind, size), yaw_rotation(10),
+                               MapFilter::adaptive, 1e-3)
+        .looked_at;
+  };
+  EXPECT_EQ(looked_at(LayoutKind::latlong, 2), 2);
+  EXPECT_EQ(looked_at(LayoutKind::octahedral, 2), 4);
+  EXPECT_EQ(looked_at(LayoutKind::octahedral, 8), 16);
+  EXPECT_EQ(looked_at(LayoutKind::octahedral, 64), 256);
+  EXPECT_EQ(looked_at(LayoutKind::horizontal_cross, 1), 6);
+}
+
 TEST(RoundTrip, TellsWhatIsLost) {
   const MapLayout map = make_layout(LayoutKind::latlong, 256);
   const Image source = paint(map, [](const Vec3d& d) {
