@@ -21,17 +21,19 @@ struct Row {
   std::vector<double> red, green, blue;
 };
 
+LIGHTKILN_CLONES void split(const float* pixels, double* red, double* green, double* blue,
+                            size_t count) {
+  for (size_t x = 0; x < count; ++x) {
+    red[x] = pixels[3 * x];
+    green[x] = pixels[3 * x + 1];
+    blue[x] = pixels[3 * x + 2];
+  }
+}
+
 void read_row(const Image& map, int y, Row* row) {
   const size_t width = static_cast<size_t>(map.width);
-  row->red.resize(width);
-  row->green.resize(width);
-  row->blue.resize(width);
-  const float* at = map.at(0, y);
-  for (size_t x = 0; x < width; ++x, at += 3) {
-    row->red[x] = at[0];
-    row->green[x] = at[1];
-    row->blue[x] = at[2];
-  }
+  for (std::vector<double>* color : {&row->red, &row->green, &row->blue}) color->resize(width);
+  split(map.at(0, y), row->red.data(), row->green.data(), row->blue.data(), width);
 }
 
 // Eight partial sums of each colour, whatever the machine's vectors hold.

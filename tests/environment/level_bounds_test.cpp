@@ -11,6 +11,7 @@
 #include "core/sphere/solid_angle.h"
 #include "tests/environment/convolved.h"
 #include "tests/reference/sphere_twins.h"
+#include "tests/support/data.h"
 
 namespace lightkiln {
 namespace {
@@ -126,6 +127,63 @@ TEST(LevelBounds, HoldOverTheWholeSphere) {
   }
   EXPECT_GT(corrected, 50);
   EXPECT_GT(broken, corrected / 2);
+}
+
+// Real skies, one with an unclipped sun, at the usual order: every level within its bound, texels
+// within a thousandth of themselves, none negative. Positive control: half of the bands are not
+// enough for that.
+TEST(LevelBounds, HoldForRealSkies) {
+  LIGHTKILN_NEEDS_DATA(data);
+  constexpr int kTexels = 40, kSize = 64;
+  constexpr double kTarget = 1e-4;  // a tenth of the order
+  for (const char* name : {"kloppenheim_05_1k.hdr", "spiaggia_di_mondello_1k.hdr"}) {
+    const Environment sky = make_environment(
+        decode_hdr_image(test::read_file(data / "environments" / "latlong_hdr" / name)));
+    const LightStatistics light = measure_light(sky);
+    for (const Lobe& lobe : {Lobe{LobeKind::ggx, 0.0625},
+                             {LobeKind::ggx, 0.25},
+                             {LobeKind::ggx, 0.5625},
+                             {LobeKind::ggx, 1},
+                             {LobeKind::charlie, 0.0625},
+                             {LobeKind::charlie, 1}}) {
+      LobePlan plan = plan_lobe(light, lobe, kTarget);
+      EXPECT_LE(plan.error_bound, 1.5 * kTarget) << name;
+      std::vector<std::pair<int, int>> places;
+      std::vector<Vec3d> directions;
+      for (int i = 0; i < kTexels; ++i) {
+        const int texel = (i * 7919 + 13) % (6 * kSize * kSize), x = texel % kSize;
+        const int line = texel / kSize;
+        places.push_back({x, line});
+        directions.push_back(cube_texel_direction(line / kSize, x, line % kSize, kSize));
+      }
+      Progress progress;
+      const LobeAverages truth = lobe_averages(sky, *make_twin_lobe(lobe), directions, 2, progress);
+      const auto compare = [&](const Image& cube, double* worst) {
+        double squares = 0;
+        for (size_t i = 0; i < places.size(); ++i) {
+          double most = 0;
+          for (int c = 0; c < 3; ++c) {
+            const double value = double(cube.at(places[i].first, places[i].second)[c]);
+            EXPECT_GE(value, 0);
+            most = std::max(most, std::abs(value - truth.means[i][c]));
+            *worst = std::max(*worst, std::abs(value / truth.means[i][c] - 1));
+          }
+          squares += most * most;
+        }
+        return std::sqrt(squares / kTexels) / light.mean_luminance;
+      };
+      double worst = 0, bare_worst = 0;
+      const double seen = compare(test::convolve(sky, plan, kSize).cube, &worst);
+      EXPECT_LE(seen, plan.error_bound) << name << " " << lobe.alpha;
+      EXPECT_LE(worst, 1e-3) << name << " " << lobe.alpha;
+      plan.bands /= 2;
+      plan.responses.resize(static_cast<size_t>(plan.bands));
+      plan.corrected = false;
+      const double bare = compare(test::convolve(sky, plan, kSize).cube, &bare_worst);
+      EXPECT_GT(bare, plan.error_bound) << name << " " << lobe.alpha;
+      EXPECT_GT(bare_worst, 1e-3) << name << " " << lobe.alpha;
+    }
+  }
 }
 
 // A level of one band alone is the mean: on the tallest rows its sine alone asks for points.
