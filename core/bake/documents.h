@@ -60,8 +60,8 @@ std::vector<ShSelftest> make_selftest(const ShRgb& sh);
 // coefficients or entries; in the unit of its bound.
 struct MeasuredError {
   uint64_t count = 0;  // how many were compared; 0 = none
-  double rms = 0, max = 0;
-  double twin = 0;  // what the twin itself may err by; 0 = nothing that counts
+  double rms = 0, max = 0;  // of colours: of the channel that errs most
+  double twin = 0;          // what the twin itself may err by; 0 = nothing that counts
 };
 // An image that a map was turned into.
 struct MapDocument {

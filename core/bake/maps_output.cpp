@@ -68,17 +68,16 @@ size_t check_index(int i, size_t all) {
 }
 
 void ErrorMeter::add(const Vec3d& value, const Vec3d& truth) {
-  double largest = 0;
-  for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(value[c] - truth[c]));
-  const double error = scale_ > 0 ? largest / scale_ : largest;
+  const Vec3d error = (value - truth) * (scale_ > 0 ? 1 / scale_ : 1.0);
   ++measured_.count;
   squares_ += error * error;
-  measured_.max = std::max(measured_.max, error);
+  for (int c = 0; c < 3; ++c) measured_.max = std::max(measured_.max, std::abs(error[c]));
 }
 
 MeasuredError ErrorMeter::result() const {
   MeasuredError measured = measured_;
-  if (measured.count > 0) measured.rms = std::sqrt(squares_ / static_cast<double>(measured.count));
+  const double most = std::max({squares_.x, squares_.y, squares_.z});
+  if (measured.count > 0) measured.rms = std::sqrt(most / static_cast<double>(measured.count));
   return measured;
 }
 

@@ -92,6 +92,7 @@ double ordered_error(double working_target);
 size_t check_index(int i, size_t all);
 
 // Differences relative to `scale`, gathered one by one, from truths that err by `twin` at most.
+// Their rms is that of the channel where it is largest, as a bound counts it.
 class ErrorMeter {
  public:
   explicit ErrorMeter(double scale, double twin = 0) : scale_(scale) {
@@ -103,7 +104,7 @@ class ErrorMeter {
  private:
   double scale_;
   MeasuredError measured_;
-  double squares_ = 0;
+  Vec3d squares_;
 };
 
 // Enters an output into the books. It counts with the larger of what was promised and what was

@@ -293,6 +293,18 @@ TEST(EnvironmentMaps, KeepTheFiguresOfCoefficientsAndTables) {
   EXPECT_LE(exact.dfg->measured.max, exact.dfg->error_bound);
 }
 
+TEST(MapsOutput, MeasuresTheChannelThatErrsMost) {
+  ErrorMeter meter(2, 0.01);
+  EXPECT_EQ(meter.result().count, 0u);
+  meter.add({1, 0.5, 0}, {0, 0, 0});
+  meter.add({0, 1.5, 0.25}, {0, 0.5, 0});
+  const MeasuredError seen = meter.result();
+  EXPECT_EQ(seen.count, 2u);
+  EXPECT_DOUBLE_EQ(seen.rms, std::sqrt((0.0625 + 0.25) / 2));
+  EXPECT_DOUBLE_EQ(seen.max, 0.5);
+  EXPECT_DOUBLE_EQ(seen.twin, 0.005);
+}
+
 TEST(MapsOutput, IsSuspiciousWhenWhatIsSeenBreaksWhatWasPromised) {
   ChunkReport report;
   Round round;

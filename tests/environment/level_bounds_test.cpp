@@ -65,17 +65,16 @@ Truth truth_of(const Environment& sky, const Lobe& lobe, int size) {
   return {size, lobe_averages(sky, *make_twin_lobe(lobe), directions, 1, progress)};
 }
 
-// Root mean square over the sphere of the largest channel's error, relative to the mean.
+// Root mean square over the sphere of the error of the channel where it is largest, relative to the
+// mean.
 double rms_error(const Image& cube, const Truth& truth, double mean) {
-  double squares = 0;
+  Vec3d squares;
   for (size_t i = 0; i < truth.averages.means.size(); ++i) {
     const int x = static_cast<int>(i) % truth.size, y = static_cast<int>(i) / truth.size;
-    double most = 0;
-    for (int c = 0; c < 3; ++c)
-      most = std::max(most, std::abs(double(cube.at(x, y)[c]) - truth.averages.means[i][c]));
-    squares += most * most * cube_texel_solid_angle(x, y % truth.size, truth.size);
+    const Vec3d error = to_double(cube.rgb(x, y)) - truth.averages.means[i];
+    squares += error * error * cube_texel_solid_angle(x, y % truth.size, truth.size);
   }
-  return std::sqrt(squares / (4 * kPi)) / mean;
+  return std::sqrt(std::max({squares.x, squares.y, squares.z}) / (4 * kPi)) / mean;
 }
 
 // Root mean square of what the twin itself may err by.
