@@ -59,7 +59,7 @@ std::vector<ShSelftest> make_selftest(const ShRgb& sh);
 // What an output differs by from a slow double-precision twin, on a sample of its texels,
 // coefficients or entries; in the unit of its bound.
 struct MeasuredError {
-  uint64_t count = 0;  // how many were compared; 0 = none
+  uint64_t count = 0;       // how many were compared; 0 = none
   double rms = 0, max = 0;  // of colours: of the channel that errs most
   double twin = 0;          // what the twin itself may err by; 0 = nothing that counts
 };

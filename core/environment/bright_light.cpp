@@ -39,9 +39,14 @@ LIGHTKILN_CLONES void find_places(const Vec3d& direction, const double* x, const
   }
 }
 
-// Between steps the table is read linearly, which a wave of band l loses (l step)^2 / 8 of.
+// Between steps the table is read linearly, of which a wave of band l loses (l step)^2 / 8, and so
+// it is integrated over cells, at (l step)^2 / 12. What few bands leave holds many: it counts as
+// that of sixteen at least.
 constexpr int kTableStepsPerBand = 128;
 constexpr int kSumStepsPerBand = 8;
+int table_bands(int bands) {
+  return std::max(16, bands);
+}
 
 // What the band limit cuts off the lobe, but for its kink: K(t) - slope max(cos t, 0) -
 // sum_{l<L} (2l+1)/(4 pi) h_l P_l(cos t), at equal steps of the angle from 0 to pi. The sum is
@@ -51,7 +56,7 @@ constexpr int kSumStepsPerBand = 8;
 std::vector<double> cut_table(const ZonalKernel& kernel, const std::vector<double>& responses) {
   constexpr int kFine = kTableStepsPerBand / kSumStepsPerBand, kTaps = 8;
   const int bands = static_cast<int>(responses.size());
-  const int coarse = kSumStepsPerBand * bands, steps = kFine * coarse;
+  const int coarse = kSumStepsPerBand * table_bands(bands), steps = kFine * coarse;
   std::vector<double> sums(static_cast<size_t>(coarse) + 1);
   for (int i = 0; i <= coarse; ++i) {
     const double z = std::cos(kPi * i / coarse);
@@ -274,16 +279,16 @@ Vec3d CutLight::at(const Vec3d& direction) const {
 //   1 - l^2 (a^2 cos^2 p + b^2 sin^2 p) / 24 + ...  against  1 - l^2 s^2 / 24 + ...
 // The second-order terms differ by at most l^2 (|(a^2 + b^2) / 2 - s^2| + |a^2 - b^2| / 2) / 24,
 // the fourth-order ones by at most (l max(a, b))^4 / 2560 (at b = 0; 1 / 5760 for a square), and
-// both factors lie between -0.22 and 1. Reading the table loses another (l step)^2 / 8. Taken as if
-// all bright light E were one source, whose squared norm in band l is E^2 (2l+1) / (4 pi).
+// both factors lie between -0.22 and 1; to these comes what the table's steps lose. Taken as if all
+// bright light E were one source, whose squared norm in band l is E^2 (2l+1) / (4 pi).
 //
 // At colatitude t a cell is not quite a rectangle: with k = cot t its sides are k of themselves a
 // radian longer towards the equator, and its parallels bend by k. Next to a pole it is a triangle,
 // k a = 2. About the centre of mass the density (1 + k y) / a has the variance a^2 (1 - (k a)^2 /
 // 12) / 12 and the third cumulant -k a^4 / 120, which a wave sees as l^2 (k a)^2 a^2 / 288 and l^3
 // k a^4 / 720; the bent parallels add l^3 k b^4 / 1900 at the most. Of a kink that crosses the cell
-// the mean moves by at most slope k a^2 / 120, and by less than slope k max(a, b)^2 / 100 with the
-// parallels'; it does so where |cos| is under (a + b) / 2, a share of as much of the sphere.
+// the mean moves by at most slope k a^2 / 120, and by slope k b^2 / 120 for the parallels; it does
+// so where |cos| is under (a + b) / 2, a share of as much of the sphere.
 //
 // The kernel is slope max(c, 0), whose bands are slope A_l and whose mean over a rectangle is
 // exact, and a rest of bands h_l - slope A_l, which falls as l^-3.5. The table holds all bands of
@@ -303,12 +308,12 @@ double cut_light_bound(const LightStatistics& light, const ZonalKernel& kernel,
                 energy * bend * bend * side * side / 288;
       third += energy * bend * side * side * side / 500;
       fourth += energy * std::max(a2, b2) * std::max(a2, b2) / 2560;
-      bent += energy * bend * side * std::sqrt(std::min(1.0, 0.5 * (row.height + row.width))) / 100;
+      bent += energy * bend * side * std::sqrt(std::min(1.0, 0.5 * (row.height + row.width))) / 60;
       all += energy;
     }
   }
-  const double step = kPi / (kTableStepsPerBand * double(bands));
-  second = second / all + step * step / 8;
+  const double step = kPi / (kTableStepsPerBand * table_bands(bands));
+  second = second / all + step * step * (1.0 / 8 + 1.0 / 12);
   third /= all;
   fourth /= all;
   const auto term = [&](double l, double response) {

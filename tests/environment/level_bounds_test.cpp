@@ -34,13 +34,15 @@ Image even_map(int height, const Vec3& value) {
 // sizes.
 std::vector<NamedMap> hard_maps() {
   std::vector<NamedMap> maps = {
-      {"sky", reference::test_sky(24, 100)},      {"sun", reference::test_sky(8, 1e5)},
-      {"one", even_map(8, {0.2f, 0.2f, 0.2f})},   {"poles", even_map(8, {0.2f, 0.2f, 0.2f})},
-      {"blue", even_map(12, {0.2f, 0.2f, 0.2f})}, {"lights", even_map(16, {0, 0, 0})}};
+      {"sky", reference::test_sky(24, 100)},          {"sun", reference::test_sky(8, 1e5)},
+      {"one", even_map(8, {0.2f, 0.2f, 0.2f})},       {"poles", even_map(8, {0.2f, 0.2f, 0.2f})},
+      {"blue", even_map(12, {0.2f, 0.2f, 0.2f})},     {"lights", even_map(16, {0, 0, 0})},
+      {"small sun", even_map(32, {0.2f, 0.2f, 0.2f})}};
   for (size_t c = 0; c < 3; ++c) {
     maps[2].image.at(2, 2)[c] = 1e6f;
     maps[3].image.at(2, 0)[c] = 1e6f;
     maps[3].image.at(3, 7)[c] = 3e5f;
+    maps[6].image.at(10, 8)[c] = 1e6f;
   }
   maps[4].image.at(5, 3)[2] = 1e5f;
   uint32_t state = 3;
