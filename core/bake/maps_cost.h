@@ -20,16 +20,19 @@ inline constexpr double kPerBrightPoint = 3e-9;
 inline constexpr double kPerCorePoint = 4e-9;
 inline constexpr double kResamplePerCell = 1.3e-8;
 // Another layout: by what convert_layout() counts.
-inline constexpr double kConvertPerPlace = 4.5e-8;
+inline constexpr double kConvertPerTexel = 4e-8;
+inline constexpr double kConvertPerPlace = 1e-7;
 inline constexpr double kConvertPerPolygon = 8e-8;
-inline constexpr double kConvertPerCovered = 5.4e-8;
-inline constexpr double kConvertPerPoint = 1.1e-7;
+inline constexpr double kConvertPerCovered = 5e-8;
+inline constexpr double kConvertPerPoint = 1e-8;
 // Beside what walks over whole grids.
 inline double conversion_seconds(const ConversionWork& work) {
-  return kConvertPerPlace * work.places + kConvertPerPolygon * work.polygons +
-         kConvertPerCovered * work.covered + kConvertPerPoint * work.points;
+  return kConvertPerTexel * work.texels + kConvertPerPlace * work.per_place * work.places +
+         kConvertPerPolygon * work.polygons + kConvertPerCovered * work.covered +
+         kConvertPerPoint * work.points;
 }
-inline constexpr double kConvertPerCheck = 1.2e-3;  // and as much for each source texel across one
+inline constexpr double kConvertPerCheck = 1.1e-3;  // and as much for each source texel across one
+inline constexpr double kBallCheck = 2.5;           // times that on a mirror ball
 inline constexpr double kLookUpPerTexel = 2.5e-7;   // of the source, for the round trip
 inline constexpr double kPerDfgPoint = 3.1e-9;
 inline constexpr double kPerCharliePoint = 9e-9;

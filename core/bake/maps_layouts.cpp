@@ -95,7 +95,8 @@ class LayoutImage : public MapsOutput {
     const Image& source = light.environment().source_image();
     const double across =
         std::sqrt(double(source.width) * source.height / (double(layout_.width) * layout_.height));
-    return kConvertPerCheck * (1 + across);
+    const double ball = layout_.kind == LayoutKind::mirror_ball ? kBallCheck : 1;
+    return kConvertPerCheck * (1 + across) * ball;
   }
 
   // Bytes: pixels, then what the round trip lost; it is measured when anything is to be checked.
@@ -205,6 +206,7 @@ MeasuredError check_layout(const ConversionSource& source, const MapLayout& layo
     int x, y;
     LayoutTruth truth;
   };
+  constexpr int kLines = 128;
   std::vector<Texel> texels;
   const size_t width = static_cast<size_t>(layout.width);
   const size_t all = width * static_cast<size_t>(layout.height);
@@ -220,7 +222,8 @@ MeasuredError check_layout(const ConversionSource& source, const MapLayout& layo
       texels.size(), 1, threads, progress,
       [&](size_t i, size_t) {
         Texel& t = texels[i];
-        t.truth = layout_truth(source.layout, *source.image, layout, rotation, filter, t.x, t.y);
+        t.truth =
+            layout_truth(source.layout, *source.image, layout, rotation, filter, t.x, t.y, kLines);
       },
       1, 1);
   ErrorMeter meter(1);

@@ -15,12 +15,10 @@ double mean_pitch(const MapLayout& layout) {
   return std::sqrt(covered_solid_angle(layout) / texels);
 }
 
-// What is kept of the order for everything else that errs.
-constexpr double kSpare = 0.5;
-
-// About a pole a few texels are the whole turn.
-bool by_pole(const ConversionTask& task, double y) {
-  return task.turn > 0 && (y < task.reach || y > task.source.layout.height - task.reach);
+// What is left of the order for misplacing alone; a tighter order is nearer to the other errors.
+double for_misplacing(double error) {
+  constexpr double kTight = 3e-4;
+  return error * (error < kTight ? 0.4 : 0.5);
 }
 
 void show(const ConversionTask& task, const Vec3d& direction, CellCorner* corner) {
@@ -46,17 +44,24 @@ GridPoint second_side(const std::array<GridPoint, 4>& p) {
 
 }  // namespace
 
+bool by_pole(const ConversionTask& task, double y) {
+  return task.turn > 0 && (y < task.reach || y > task.source.layout.height - task.reach);
+}
+
 ConversionTask make_conversion(const ConversionSource& source, const MapLayout& to,
                                const Rotation& rotation, MapFilter filter, double error) {
   const MapLayout& from = source.layout;
   ConversionTask task{
-      source, to, rotation, filter, error, !rotation.is_identity(), turn_columns(from),
+      source, to, rotation, filter, error, !rotation.is_identity(), turn_columns(from), 0,
       0,      0,  0,        0,      0};
   const double ratio = mean_pitch(to) / mean_pitch(from);
   task.seam_depth = std::clamp(static_cast<int>(std::ceil(std::log2(8 * ratio))), 1, 9);
   task.reach = static_cast<int>(std::clamp(std::ceil(1.5 * ratio), 1.0, 64.0)) + 1;
   constexpr double kStraight = 0.07;  // radians
   task.least = std::clamp(static_cast<int>(std::ceil(std::log2(mean_pitch(to) / kStraight))), 0, 6);
+  // The edges of texels wider than 1.5 degrees bend enough to be looked at for a coarse order too.
+  constexpr double kWide = 0.026;  // radians
+  task.not_asked = mean_pitch(to) > kWide ? 0.05 : 0.004;
   // Straight edges: within 1/48 of a turn along rows, 1/96 of the sphere's half turn otherwise.
   const int size = is_cube(from.kind) ? cube_face_size(from) : from.height;
   task.span_y = std::max(4.0, size / (is_cube(from.kind) ? 24.0 : 96.0));
@@ -120,19 +125,19 @@ double smaller_span(GridPoint p, GridPoint q, GridPoint a, GridPoint b) {
   return larger > 0 ? std::abs(det) / std::sqrt(larger) : 0;
 }
 
-double CellOutline::span_at(size_t i) const {
-  const auto side = [&](const std::array<GridPoint, 4>& corners, size_t to) {
-    return GridPoint{corners[to % 4].x - corners[i].x, corners[to % 4].y - corners[i].y};
-  };
-  return smaller_span(side(target, i + 1), side(target, i + 3), side(points, i + 1),
-                      side(points, i + 3));
-}
-
 double CellOutline::first_length() const {
   return std::max(distance(points[0], points[1]), distance(points[3], points[2]));
 }
 double CellOutline::second_length() const {
   return std::max(distance(points[0], points[3]), distance(points[1], points[2]));
+}
+
+bool CellOutline::skewed() const {
+  constexpr double kSkewed = 0.1;
+  const auto& p = points;
+  const double x = p[0].x - p[1].x + p[2].x - p[3].x, y = p[0].y - p[1].y + p[2].y - p[3].y;
+  const double longest = std::max(ax * ax + ay * ay, bx * bx + by * by);
+  return x * x + y * y > kSkewed * kSkewed * longest;
 }
 
 bool CellOutline::slender() const {
@@ -160,9 +165,9 @@ std::optional<CellOutline> outline_of(const ConversionTask& task,
   }
   for (size_t i = 0; i < 4; ++i) {
     const GridPoint &a = p[i], &b = p[(i + 1) % 4];
-    const bool wide_x = std::abs(a.x - b.x) > task.span_x;
-    if (wide_x && (by_pole(task, a.y) || by_pole(task, b.y))) return std::nullopt;
-    found.wide = found.wide || wide_x || std::abs(a.y - b.y) > task.span_y;
+    const double x = std::abs(a.x - b.x), y = std::abs(a.y - b.y);
+    if (x > task.span_x && (by_pole(task, a.y) || by_pole(task, b.y))) return std::nullopt;
+    found.wide = found.wide || x > task.span_x || y > task.span_y;
   }
   const GridPoint a = first_side(p), b = second_side(p);
   found.ax = a.x;
@@ -239,7 +244,7 @@ void add_values(const ConversionTask& task, const TargetCell& cell,
 double allowed_misplacement(const ConversionTask& task, const ValueRange& range) {
   const double spread = range.spread();
   const double scale = std::max(task.source.mean, range.brightest());
-  return spread > 0 ? std::min(1.0, kSpare * task.error * scale / spread) : 1.0;
+  return spread > 0 ? std::min(1.0, for_misplacing(task.error) * scale / spread) : 1.0;
 }
 
 }  // namespace lightkiln

@@ -11,6 +11,7 @@
 #include "core/environment/layout_gather.h"
 #include "core/environment/resample.h"
 #include "core/sphere/cube_cross.h"
+#include "core/sphere/radial_map.h"
 
 namespace lightkiln {
 
@@ -139,9 +140,57 @@ Image convert_layout(const MapLayout& from, const Image& source, const MapLayout
                         threads, progress);
 }
 
+namespace {
+
+void add_texel_at(const ConversionTask& task, double x, double y, TexelGatherer* gatherer) {
+  const int i = std::clamp(static_cast<int>(x), 0, task.to.width - 1);
+  const int j = std::clamp(static_cast<int>(y), 0, task.to.height - 1);
+  GatheredLight light;
+  gatherer->add_texel(locate_corners(task, texel_cell(task.to, block_of(task.to, i, j), i, j, {})),
+                      &light);
+}
+
+void add_work(const ConversionWork& part, double scale, ConversionWork* work) {
+  work->texels += scale * part.texels;
+  work->places += scale * part.places;
+  work->polygons += scale * part.polygons;
+  work->covered += scale * part.covered;
+  work->points += scale * part.points;
+}
+
+// The outermost texels of a disc are few and cost many times what others do; they are counted
+// apart.
+constexpr double kRimBand = 8;  // texels
+
+bool in_rim_band(const MapLayout& to, double x, double y) {
+  const double half = 0.5 * to.width, radius = std::hypot(x - half, y - half);
+  return radius > half - kRimBand && radius <= half;
+}
+
+// Adds what that band costs and returns its area in texels; 0 without one.
+double add_rim_work(const ConversionTask& task, ConversionWork* work) {
+  const double half = 0.5 * task.to.width, inner = half - kRimBand;
+  if (!is_radial(task.to.kind) || half < 8 * kRimBand) return 0;
+  constexpr int kTexels = 256;
+  TexelGatherer gatherer(task);
+  const double squares = half * half - inner * inner;
+  for (int i = 1; i <= kTexels; ++i) {
+    const double u = 0.5 + i * 0.7548776662466927, v = 0.5 + i * 0.5698402909980532;
+    const double phi = 2 * kPi * (u - std::floor(u));
+    const double radius = std::sqrt(inner * inner + (v - std::floor(v)) * squares);
+    add_texel_at(task, half + radius * std::cos(phi), half + radius * std::sin(phi), &gatherer);
+  }
+  const double area = kPi * squares;
+  work->looked_at += kTexels;
+  add_work(gatherer.work(), area / kTexels, work);
+  return area;
+}
+
+}  // namespace
+
 ConversionWork estimate_conversion(const ConversionSource& source, const MapLayout& to,
                                    const Rotation& rotation, MapFilter filter, double error) {
-  constexpr int kTexels = 256, kFewest = 8;
+  constexpr int kTexels = 1024, kFewest = 8;
   ConversionWork work;
   if (moves_texels(source.layout, to, rotation)) return work;
   const ConversionTask task = make_conversion(source, to, rotation, filter, error);
@@ -152,33 +201,35 @@ ConversionWork estimate_conversion(const ConversionSource& source, const MapLayo
     work.walked = true;
     return work;
   }
+  for (const MapLayout& layout : {source.layout, to}) {
+    if (is_radial(layout.kind)) work.per_place += 0.3;
+    if (layout.camera_distance > 0) work.per_place += 0.8;
+  }
+  const double band = add_rim_work(task, &work);
   TexelGatherer gatherer(task);
   int sampled = 0;
-  const auto sample = [&](int x, int y) {
-    if (size > 0 && !texel_has_direction(to, x, y)) return;
-    const TargetBlock block = block_of(to, x, y);
-    GatheredLight light;
-    gatherer.add_texel(locate_corners(task, texel_cell(to, block, x, y, {})), &light);
+  const auto sample = [&](double x, double y) {
+    const int i = static_cast<int>(x), j = static_cast<int>(y);
+    if (size > 0 && !texel_has_direction(to, i, j)) return;
+    if (band > 0 && in_rim_band(to, x, y)) return;
+    add_texel_at(task, x, y, &gatherer);
     ++sampled;
   };
   // The fewer texels a target has, the more of the source each one shows: a quarter of them takes a
   // quarter of the conversion.
   const int wanted = std::clamp(static_cast<int>(texels / 4), kFewest, kTexels);
   if (texels <= wanted) {
-    for (int i = 0; i < to.width * to.height; ++i) sample(i % to.width, i / to.width);
+    for (int i = 0; i < to.width * to.height; ++i) {
+      sample(i % to.width + 0.5, i / to.width + 0.5);
+    }
   }
   // Spread by the fractions of a plastic number, which fill a square evenly at any count.
-  for (int i = 0; i < 4 * wanted && sampled < std::min<double>(wanted, texels); ++i) {
+  for (int i = 1; i <= 4 * wanted && sampled < std::min<double>(wanted, texels); ++i) {
     const double u = 0.5 + i * 0.7548776662466927, v = 0.5 + i * 0.5698402909980532;
-    sample(static_cast<int>((u - std::floor(u)) * to.width),
-           static_cast<int>((v - std::floor(v)) * to.height));
+    sample((u - std::floor(u)) * to.width, (v - std::floor(v)) * to.height);
   }
-  work = gatherer.work();
-  work.looked_at = sampled;
-  const double scale = texels / sampled;
-  for (double* count : {&work.texels, &work.places, &work.polygons, &work.covered, &work.points}) {
-    *count *= scale;
-  }
+  if (sampled > 0) add_work(gatherer.work(), (texels - band) / sampled, &work);
+  work.looked_at += sampled;
   return work;
 }
 

@@ -50,15 +50,16 @@ bool moves_texels(const MapLayout& from, const MapLayout& to, const Rotation& ro
 
 // What a conversion takes, for prices.
 struct ConversionWork {
-  double texels = 0;    // of the target
-  double places = 0;    // looked up in the source
-  double polygons = 0;  // laid over a grid
-  double covered = 0;   // texels under them
-  double points = 0;    // interpolated
-  bool walked = false;  // in closed form, by resample_to_cube()
-  int looked_at = 0;    // texels that this was estimated from
+  double texels = 0;     // of the target
+  double per_place = 1;  // what one costs, in those of a layout without discs
+  double places = 0;     // looked up in the source
+  double polygons = 0;   // laid over a grid; of eight edges twice
+  double covered = 0;    // texels under them
+  double points = 0;     // interpolated
+  bool walked = false;   // in closed form, by resample_to_cube()
+  int looked_at = 0;     // texels that this was estimated from
 };
-// Estimated from a few hundred texels, or a quarter of few.
+// Estimated from about a thousand texels, or a quarter of few.
 ConversionWork estimate_conversion(const ConversionSource& source, const MapLayout& to,
                                    const Rotation& rotation, MapFilter filter, double error);
 

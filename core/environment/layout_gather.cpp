@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/environment/layout_bend.h"
 #include "core/sphere/cube_cross.h"
 #include "core/sphere/radial_map.h"
 
@@ -18,22 +19,16 @@ namespace lightkiln {
 
 namespace {
 
-// Where more than this may be misplaced nothing is looked for.
-constexpr double kNotAsked = 0.004;
 // Halvings of a texel: at seams, where edges bend (and for the tightest orders), and where a fold
 // crosses it.
-constexpr int kDeepest = 9, kDeepestBend = 4, kDeepestTightBend = 7, kDeepestKink = 3;
+constexpr int kDeepest = 9, kDeepestBend = 4, kDeepestTightBend = 7;
+constexpr int kDeepestKink = 4, kDeepestTightKink = 7;
 constexpr double kTight = 1e-4;
 // Two parts with outlines of their own are sooner done.
 constexpr double kManyPoints = 48;
 
 GridPoint middle(const GridPoint& a, const GridPoint& b) {
   return {0.5 * (a.x + b.x), 0.5 * (a.y + b.y)};
-}
-
-// The share of smoothing where a texel spans so many of the source.
-double smooth_share(double span) {
-  return std::clamp(2 - 2 * span, 0.0, 1.0);
 }
 
 }  // namespace
@@ -125,7 +120,13 @@ void TexelGatherer::add(const TargetCell& cell, int level, GatheredLight* light)
     // A seam misplaces a quarter of the cells that it crosses, half of them each way; it crosses
     // few texels.
     const int depth = static_cast<int>(std::ceil(std::log2(0.02 / allowed_) / 1.25));
-    if (level >= std::clamp(depth, allowed_ < kNotAsked ? task_.seam_depth : 1, kDeepest)) {
+    // About a pole cells are all seams.
+    constexpr int kLeastAtPole = 4;
+    int least = allowed_ < task_.not_asked ? task_.seam_depth : std::max(1, task_.seam_depth - 2);
+    for (const CellCorner& corner : cell.corners) {
+      if (corner.covered && by_pole(task_, corner.place.y)) least = std::max(least, kLeastAtPole);
+    }
+    if (level >= std::clamp(depth, least, kDeepest)) {
       add_point(cell, light);
       return;
     }
@@ -136,117 +137,125 @@ void TexelGatherer::add(const TargetCell& cell, int level, GatheredLight* light)
 void TexelGatherer::add_outline(const TargetCell& cell, const CellOutline& outline, int level,
                                 GatheredLight* light) {
   const double size = part_ / (1 << level);
-  double smooth = 0;
-  if (task_.filter == MapFilter::adaptive) {
-    smooth = smooth_share(outline.span);
-    const Uneven uneven = level < kDeepestKink ? smooths_unevenly(outline) : Uneven{};
-    if (uneven.first != uneven.second) {
-      halve(cell, uneven.first, level, light);
+  // Where nothing is looked for only odd cells are: in slender ones edges that bend by a hair move
+  // much of the light from one end to the other, and skewed ones lie about a pole or a fold.
+  const bool asked =
+      allowed_ <= task_.not_asked || (allowed_ < 1 && (outline.slender() || outline.skewed()));
+  const bool adaptive = task_.filter == MapFilter::adaptive;
+  SmoothShare share;
+  if (adaptive) share.middle = smooth_share(outline.span);
+  if (!asked) {
+    lay_over(cell, outline, share, level, {}, light);
+    return;
+  }
+  CellBends bends;
+  const bool seen = look_along_edges(cell, outline, &bends);
+  if (seen && adaptive) {
+    share = smooth_share_over(outline, bends);
+    // A fold of either layout crosses the cell.
+    constexpr double kEven = 0.2;
+    const bool first = share.first_step > kEven, second = share.second_step > kEven;
+    const int deepest = allowed_ < kTight ? kDeepestTightKink : kDeepestKink;
+    if (level < deepest && first != second) {
+      halve(cell, first, level, light);
       return;
     }
-    if (uneven.first) {
+    if (level < deepest && first) {
       split(cell, level, light);
       return;
     }
+    if (first || second || outline.skewed()) share.along_x = share.along_y = 0;
+    share.middle = smooth_share(outline.span);
   }
-  // Where nothing is looked for only slender cells are: in them edges that bend by a hair move much
-  // of the light from one end to the other.
-  const bool asked = allowed_ <= kNotAsked || (allowed_ < 1 && outline.slender());
-  const Bend bend = asked ? bend_of(cell, outline) : Bend{};
-  const bool deformed = size * smooth * bend.within > allowed_;
-  const double misplaced = (1 - smooth) * (bend.among_texels + bend.within) +
-                           smooth * (bend.between_samples + (deformed ? 0 : bend.within));
-  // A cell is a small part of the texel, and a row of them half as much at each halving.
-  const int deepest = allowed_ < kTight ? kDeepestTightBend : kDeepestBend;
+  const double smooth = share.middle;
   const double points = std::max(1.0, fineness() * outline.first_length()) *
                         std::max(1.0, fineness() * outline.second_length());
-  if (level < deepest && (size * misplaced > allowed_ || (deformed && points > kManyPoints))) {
+  Shape shape;
+  for (const double left : {1.0, 0.25}) {
+    const Misplaced moved = misplaced_by(outline, bends, left);
+    shape = {left < 1 ? &bends : nullptr, size * smooth * moved.within > allowed_};
+    const double misplaced =
+        (1 - smooth) * (moved.among_texels + moved.within) +
+        smooth * (moved.between_samples + (shape.by_points ? 0 : moved.within));
+    if (seen && size * misplaced <= allowed_ && !(shape.by_points && points > kManyPoints)) {
+      lay_over(cell, outline, share, level, shape, light);
+      return;
+    }
+  }
+  // A cell is a small part of the texel, and a row of them half as much at each halving.
+  const int deepest = allowed_ < kTight ? kDeepestTightBend : kDeepestBend;
+  if (level < deepest) {
     divide(cell, outline, level, light);
-    return;
+  } else {
+    shape.bends = nullptr;
+    lay_over(cell, outline, share, level, shape, light);
   }
+}
+
+void TexelGatherer::lay_over(const TargetCell& cell, const CellOutline& outline,
+                             const SmoothShare& smooth, int level, const Shape& shape,
+                             GatheredLight* light) {
   GatheredLight part;
-  if (smooth < 1) add_area(cell, outline, 1 - smooth, &part);
+  if (!smooth.full()) add_area(outline, shape.bends, smooth, &part);
   // Points have weights of their own, whatever the outline's shape.
-  if (smooth > 0 && (deformed || !add_interpolated(outline, smooth, &part))) {
-    add_points(cell, outline, smooth, level, &part);
+  if (!smooth.none() &&
+      (shape.by_points || !add_interpolated(outline, shape.bends, smooth, &part))) {
+    add_points(cell, outline, shape.bends, smooth, level, &part);
   }
+  // All of it where the source's texels have no solid angle.
+  if (part.omega == 0) add_point(cell, &part);
   // Beside other parts of the texel it counts as much as it shows.
   const bool alone =
       level == 0 && patch_ == nullptr && task_.to.convention == TexelConvention::half_texel;
   light->add(part.mean(), alone ? part.omega : solid_angle(cell));
 }
 
-TexelGatherer::Uneven TexelGatherer::smooths_unevenly(const CellOutline& outline) const {
-  constexpr double kEven = 0.2;
-  if (allowed_ > kNotAsked) return {};
-  double share[4];
-  for (size_t i = 0; i < 4; ++i) share[i] = smooth_share(outline.span_at(i));
-  const double first = std::max(std::abs(share[0] - share[1]), std::abs(share[3] - share[2]));
-  const double second = std::max(std::abs(share[0] - share[3]), std::abs(share[1] - share[2]));
-  return {first > kEven, second > kEven};
-}
-
-// An edge that bends by d at its middle shifts a sliver of 2/3 of its length times d from one side
-// to the other; opposite edges bend alike. Across a slender cell it shifts no more than 2/3 d of
-// what lies on either side of a border, but where opposite edges bend unlike, by e, the cell is
-// wider or narrower than it seems, and 2/3 e over its width is the share of the light that is moved
-// along.
-TexelGatherer::Bend TexelGatherer::bend_of(const TargetCell& cell, const CellOutline& outline) {
+// False where an edge leaves the picture.
+bool TexelGatherer::look_along_edges(const TargetCell& cell, const CellOutline& outline,
+                                     CellBends* bends) {
   const double x = 0.5 * (cell.x0 + cell.x1), y = 0.5 * (cell.y0 + cell.y1);
-  const CellCorner top = look_up(x, cell.y0), left = look_up(cell.x0, y), centre = look_up(x, y);
-  if (!top.covered || !left.covered || !centre.covered) return {1, 1, 1};
-  const auto& p = outline.points;
-  const auto bend = [&](const CellCorner& corner, const GridPoint& straight) {
-    GridPoint bent{corner.place.x - straight.x, corner.place.y - straight.y};
-    if (task_.turn > 0) bent.x -= task_.turn * std::nearbyint(bent.x / task_.turn);
-    return bent;
-  };
-  const GridPoint along = bend(top, middle(p[0], p[1])), down = bend(left, middle(p[0], p[3]));
-  // Of the middle: what the other two edges bend by where these are straight.
-  const GridPoint rest = bend(centre, middle(middle(p[0], p[1]), middle(p[2], p[3])));
-  const auto across = [&](const GridPoint& bent, double side_x, double side_y) {
-    return std::abs(bent.x * side_y - bent.y * side_x) / std::max(outline.area, 1e-300);
-  };
-  const double slivers =
-      4.0 / 3.0 *
-      (std::max(across(along, outline.ax, outline.ay), across(rest, outline.ax, outline.ay)) +
-       std::max(across(down, outline.bx, outline.by), across(rest, outline.bx, outline.by)));
-  const double shift = std::hypot(along.x, along.y) + std::hypot(down.x, down.y);
-  const auto seen = [](double bent) {
-    constexpr double kShown = 0.25;  // shifts of opposite edges that cancel, and luck
-    return bent * std::min(1.0, kShown + 4 * bent);
-  };
-  Bend found;
-  found.between_samples = seen(2.0 / 3.0 * shift);
-  found.among_texels = seen(std::min(1.0, slivers));
-  if (!outline.slender()) return found;
-  const CellCorner bottom = look_up(x, cell.y1), right = look_up(cell.x1, y);
-  if (!bottom.covered || !right.covered) return {1, 1, 1};
-  const GridPoint along_end = bend(bottom, middle(p[3], p[2]));
-  const GridPoint down_end = bend(right, middle(p[1], p[2]));
-  const GridPoint wider{along_end.x - along.x, along_end.y - along.y};
-  const GridPoint higher{down_end.x - down.x, down_end.y - down.y};
-  // Edges that do not lie beside each other but one behind the other do so by bending alike.
-  const double behind = std::abs(outline.ax * outline.bx + outline.ay * outline.by);
-  const double first = outline.ax * outline.ax + outline.ay * outline.ay;
-  const double second = outline.bx * outline.bx + outline.by * outline.by;
-  const double unlike =
-      std::max(across(wider, outline.ax, outline.ay), across(wider, outline.bx, outline.by)) +
-      std::max(across(higher, outline.ax, outline.ay), across(higher, outline.bx, outline.by)) +
-      std::min(1.0, behind / std::max(first, 1e-300)) * across(along, outline.ax, outline.ay) +
-      std::min(1.0, behind / std::max(second, 1e-300)) * across(down, outline.bx, outline.by);
-  // What is moved differs by no more than values do over the cell's length.
-  const double length = std::max(outline.first_length(), outline.second_length());
-  found.among_texels = seen(std::min({1.0, slivers, 4.0 / 3.0 * shift}));
-  found.within = 0.5 * std::min(1.0, 2.0 / 3.0 * unlike) * std::min(1.0, length);
-  return found;
+  const CellCorner middles[4] = {look_up(x, cell.y0), look_up(cell.x1, y), look_up(x, cell.y1),
+                                 look_up(cell.x0, y)};
+  GridPoint* const found[4] = {&bends->top, &bends->right, &bends->bottom, &bends->left};
+  for (size_t i = 0; i < 4; ++i) {
+    if (!middles[i].covered) return false;
+    const GridPoint straight = middle(outline.points[i], outline.points[(i + 1) % 4]);
+    const GridPoint here = middle(outline.target[i], outline.target[(i + 1) % 4]);
+    bends->target[i] = {middles[i].at.x - here.x, middles[i].at.y - here.y};
+    *found[i] = {middles[i].place.x - straight.x, middles[i].place.y - straight.y};
+    if (task_.turn > 0) found[i]->x -= task_.turn * std::nearbyint(found[i]->x / task_.turn);
+  }
+  // A fold that no edge tells of shows in the middle.
+  const CellCorner centre = look_up(x, y);
+  if (!centre.covered) return false;
+  const GridPoint expected = bent_place(outline, *bends, 0.5, 0.5);
+  double off = centre.place.x - expected.x;
+  if (task_.turn > 0) off -= task_.turn * std::nearbyint(off / task_.turn);
+  const double down = centre.place.y - expected.y;
+  return off * off + down * down < 0.0025 * std::max(1.0, outline.area);
 }
 
-void TexelGatherer::add_area(const TargetCell& cell, const CellOutline& outline, double share,
-                             GatheredLight* light) {
-  ++work_.polygons;
-  coverage_.cover(outline.points.data(), 4);
-  const double before = light->omega;
+// On the grid of texels, or of samples, which is half a texel off it.
+void TexelGatherer::cover(const CellOutline& outline, const CellBends* bends, double shift) {
+  work_.polygons += bends != nullptr ? 2 : 1;  // by their edges
+  std::array<GridPoint, 8> border;
+  size_t count = 4;
+  if (bends != nullptr) {
+    border = bent_border(outline, *bends);
+    count = 8;
+  } else {
+    std::copy(outline.points.begin(), outline.points.end(), border.begin());
+  }
+  for (size_t i = 0; i < count; ++i) {
+    border[i].x -= shift;
+    border[i].y -= shift;
+  }
+  coverage_.cover(border.data(), count);
+}
+
+void TexelGatherer::add_area(const CellOutline& outline, const CellBends* bends,
+                             const SmoothShare& smooth, GatheredLight* light) {
+  cover(outline, bends, 0);
   for (int y = coverage_.top(); y <= coverage_.bottom(); ++y) {
     const int row = std::clamp(y, 0, task_.source.layout.height - 1);
     for (int x = coverage_.left(); x <= coverage_.right(); ++x) {
@@ -257,30 +266,33 @@ void TexelGatherer::add_area(const TargetCell& cell, const CellOutline& outline,
       const double omega = double(density.centre) * part.area + double(density.along_x) * part.u +
                            double(density.along_y) * part.v;
       if (omega <= 0) continue;
+      const double smoothed =
+          smooth.at(x + 0.5, y + 0.5) * omega +
+          double(density.centre) * (smooth.along_x * part.u + smooth.along_y * part.v);
       ++work_.covered;
       if (radial_) find_value(task_.source.layout, &i, &j);
-      light->add(to_double(task_.source.image->rgb(i, j)), share * omega);
+      light->add(to_double(task_.source.image->rgb(i, j)), std::max(0.0, omega - smoothed));
     }
   }
-  // All of it where the source's texels have no solid angle.
-  if (light->omega == before) add_point(cell, light);
 }
 
 // Between four samples the interpolation is a polynomial, and its integral over the part of the
 // polygon there follows from the part's moments: on the grid of samples, half a texel off that of
 // texels. False where not all samples are inside the image and show something, or the polygon has
 // no area.
-bool TexelGatherer::add_interpolated(const CellOutline& outline, double share,
-                                     GatheredLight* light) {
-  std::array<GridPoint, 4> points = outline.points;
-  double low_x = points[0].x, high_x = low_x, low_y = points[0].y, high_y = low_y;
-  for (GridPoint& p : points) {
+bool TexelGatherer::add_interpolated(const CellOutline& outline, const CellBends* bends,
+                                     const SmoothShare& smooth, GatheredLight* light) {
+  double low_x = outline.points[0].x, high_x = low_x, low_y = outline.points[0].y, high_y = low_y;
+  const auto include = [&](const GridPoint& p) {
     low_x = std::min(low_x, p.x);
     high_x = std::max(high_x, p.x);
     low_y = std::min(low_y, p.y);
     high_y = std::max(high_y, p.y);
-    p.x -= 0.5;
-    p.y -= 0.5;
+  };
+  if (bends != nullptr) {
+    for (const GridPoint& p : bent_border(outline, *bends)) include(p);
+  } else {
+    for (const GridPoint& p : outline.points) include(p);
   }
   int left = 0, top = 0, right = task_.source.layout.width, bottom = task_.source.layout.height;
   if (is_cube(task_.source.layout.kind)) {
@@ -299,8 +311,7 @@ bool TexelGatherer::add_interpolated(const CellOutline& outline, double share,
     const double y = std::max(std::abs(low_y - half), std::abs(high_y - half));
     if (safe <= 0 || x * x + y * y >= safe * safe) return false;
   }
-  ++work_.polygons;
-  coverage_.cover(points.data(), 4);
+  cover(outline, bends, 0.5);
   const double before = light->omega;
   for (int y = coverage_.top(); y <= coverage_.bottom(); ++y) {
     const double blend = task_.source.blend(y);
@@ -309,25 +320,30 @@ bool TexelGatherer::add_interpolated(const CellOutline& outline, double share,
       if (part.area <= 0) continue;
       ++work_.covered;
       const int x0 = column(x), x1 = column(x + 1);
-      // The lower row's weight t + k t (1 - t), t = v + 1/2, times 1 and times u; where k counts,
-      // a part lies so close to its middle that u v^2 is u times v^2.
-      const double bent = blend * (0.25 * part.area - part.vv);
-      const double bent_u = blend * (0.25 * part.u - part.u * part.vv / part.area);
-      const double lower = 0.5 * part.area + part.v + bent;
-      const double lower_u = 0.5 * part.u + part.uv + bent_u;
-      const double upper = part.area - lower, upper_u = part.u - lower_u;
+      // The share of smoothing times the solid angle's density, h + g u + f v, times 1, u, v and u
+      // v; u^2 v and u v^2 as if u and v were independent over the part.
+      const double d0 = task_.source.density(x0, y), d1 = task_.source.density(x1, y);
+      const double d2 = task_.source.density(x0, y + 1), d3 = task_.source.density(x1, y + 1);
+      const double density = 0.25 * (d0 + d1 + d2 + d3), share = smooth.at(x + 1, y + 1);
+      const double h = share * density;
+      const double g = smooth.along_x * density + share * 0.5 * (d1 - d0 + d3 - d2);
+      const double f = smooth.along_y * density + share * 0.5 * (d2 - d0 + d3 - d1);
+      const double one = h * part.area + g * part.u + f * part.v;
+      const double by_u = h * part.u + g * part.uu + f * part.uv;
+      const double by_v = h * part.v + g * part.uv + f * part.vv;
+      const double by_uv = h * part.uv + (g * part.uu * part.v + f * part.u * part.vv) / part.area;
+      // The lower row's weight t + k t (1 - t), t = v + 1/2, times these; where k counts, a part
+      // lies so close to its middle that u v^2 is u times v^2.
+      const double bent = h * blend * (0.25 * part.area - part.vv);
+      const double bent_u = h * blend * (0.25 * part.u - part.u * part.vv / part.area);
+      const double lower = 0.5 * one + by_v + bent, lower_u = 0.5 * by_u + by_uv + bent_u;
+      const double upper = one - lower, upper_u = by_u - lower_u;
       const double weights[4] = {0.5 * upper - upper_u, 0.5 * upper + upper_u,
                                  0.5 * lower - lower_u, 0.5 * lower + lower_u};
-      // At the part's centroid.
-      const double s = 0.5 + part.u / part.area, t = 0.5 + part.v / part.area;
-      const double above = (1 - s) * task_.source.density(x0, y) + s * task_.source.density(x1, y);
-      const double below =
-          (1 - s) * task_.source.density(x0, y + 1) + s * task_.source.density(x1, y + 1);
-      const double omega = share * ((1 - t) * above + t * below);
-      light->add(to_double(task_.source.image->rgb(x0, y)), omega * std::max(0.0, weights[0]));
-      light->add(to_double(task_.source.image->rgb(x1, y)), omega * std::max(0.0, weights[1]));
-      light->add(to_double(task_.source.image->rgb(x0, y + 1)), omega * std::max(0.0, weights[2]));
-      light->add(to_double(task_.source.image->rgb(x1, y + 1)), omega * std::max(0.0, weights[3]));
+      light->add(to_double(task_.source.image->rgb(x0, y)), std::max(0.0, weights[0]));
+      light->add(to_double(task_.source.image->rgb(x1, y)), std::max(0.0, weights[1]));
+      light->add(to_double(task_.source.image->rgb(x0, y + 1)), std::max(0.0, weights[2]));
+      light->add(to_double(task_.source.image->rgb(x1, y + 1)), std::max(0.0, weights[3]));
     }
   }
   return light->omega > before;
@@ -335,12 +351,13 @@ bool TexelGatherer::add_interpolated(const CellOutline& outline, double share,
 
 // n points a texel's side miss the integral of an interpolation by about 0.1 / n^2.
 double TexelGatherer::fineness() const {
-  return std::clamp(std::sqrt(0.05 / allowed_), 1.0, 10.0);
+  return std::clamp(std::sqrt(0.05 / allowed_), 1.0, 24.0);
 }
 
 // At places interpolated between the corners.
-void TexelGatherer::add_points(const TargetCell& cell, const CellOutline& outline, double share,
-                               int level, GatheredLight* light) {
+void TexelGatherer::add_points(const TargetCell& cell, const CellOutline& outline,
+                               const CellBends* bends, const SmoothShare& smooth, int level,
+                               GatheredLight* light) {
   const auto& p = outline.points;
   const int most = std::max(2, 32 >> level);
   const auto count = [&](double length) {
@@ -348,7 +365,7 @@ void TexelGatherer::add_points(const TargetCell& cell, const CellOutline& outlin
   };
   const int columns = count(outline.first_length()), rows = count(outline.second_length());
   const double width = cell.x1 - cell.x0, height = cell.y1 - cell.y0;
-  const double area = share * width * height / (columns * rows);
+  const double area = width * height / (columns * rows);
   double d[4] = {0, 0, 0, 0};
   if (patch_ == nullptr) {
     d[0] = solid_angle_density(task_.to, cell.x0, cell.y0);
@@ -367,6 +384,12 @@ void TexelGatherer::add_points(const TargetCell& cell, const CellOutline& outlin
       const double s = (i + 0.5) / columns;
       MapPlace place{left.x + s * (right.x - left.x), left.y + s * (right.y - left.y),
                      outline.chart};
+      if (bends != nullptr) {
+        const GridPoint bent = bent_place(outline, *bends, s, t);
+        place.x = bent.x;
+        place.y = bent.y;
+      }
+      const double share = std::clamp(smooth.at(place.x, place.y), 0.0, 1.0);
       if (task_.turn > 0) {
         const double start = task_.source.layout.convention == TexelConvention::openexr ? 0.5 : 0;
         place.x -= task_.turn * std::floor((place.x - start) / task_.turn);
@@ -374,7 +397,7 @@ void TexelGatherer::add_points(const TargetCell& cell, const CellOutline& outlin
       ++work_.points;
       light->add(
           smooth_radiance(task_.source.layout, *task_.source.image, place, task_.source.blend),
-          area * (left_density + s * (right_density - left_density)));
+          share * area * (left_density + s * (right_density - left_density)));
     }
   }
 }

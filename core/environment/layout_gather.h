@@ -26,6 +26,7 @@ struct ConversionTask {
   double span_x, span_y;  // the widest cell that is taken for a polygon, in source texels
   int seam_depth;         // of halving that leaves eight cells to a source texel's side
   int reach;              // source texels about a corner that a texel may show
+  double not_asked;       // where more than this may be misplaced nothing is looked for
 };
 ConversionTask make_conversion(const ConversionSource& source, const MapLayout& to,
                                const Rotation& rotation, MapFilter filter, double error);
@@ -40,6 +41,9 @@ struct CellCorner {
 CellCorner locate(const ConversionTask& task, double x, double y);
 // The same in the coordinates of a patch.
 CellCorner locate(const ConversionTask& task, const RimPatch& patch, double a, double b);
+
+// About a pole, at row y of the source, a few texels are the whole turn.
+bool by_pole(const ConversionTask& task, double y);
 
 // A rectangle of the target, or of a patch's coordinates, and its corners: top left, top right,
 // bottom right, bottom left.
@@ -77,13 +81,13 @@ struct CellOutline {
   double area = 0, span = 0;
   bool wide = false;  // too wide for straight edges
 
-  // The same by the sides at corner i alone.
-  double span_at(size_t i) const;
   // Of the longer of two opposite sides.
   double first_length() const;
   double second_length() const;
   // Far longer than wide.
   bool slender() const;
+  // No parallelogram: opposite sides differ.
+  bool skewed() const;
 };
 // None when the corners are not on one piece of the picture, or about a pole.
 std::optional<CellOutline> outline_of(const ConversionTask& task,
@@ -120,6 +124,9 @@ struct GatheredLight {
   }
 };
 
+struct CellBends;
+struct SmoothShare;
+
 // One thread's work on texels of the target.
 class TexelGatherer {
  public:
@@ -130,30 +137,28 @@ class TexelGatherer {
   const ConversionWork& work() const { return work_; }
 
  private:
-  // What straight edges do to a cell, as shares of its weights that are misplaced: the shift of
-  // opposite edges that bend alike, to the source's texels and to an interpolation between them,
-  // and what edges that bend unlike move from one end of the cell to another.
-  struct Bend {
-    double among_texels = 0, between_samples = 0, within = 0;
+  // How a cell is laid over the source.
+  struct Shape {
+    const CellBends* bends = nullptr;  // null = straight edges
+    bool by_points = false;
   };
 
   void add(const TargetCell& cell, int level, GatheredLight* light);
   void add_outline(const TargetCell& cell, const CellOutline& outline, int level,
                    GatheredLight* light);
   void add_rim(const std::vector<RimPatch>& patches, GatheredLight* light);
-  // Along which sides one share of smoothing does not do for the whole cell.
-  struct Uneven {
-    bool first = false, second = false;
-  };
-  Uneven smooths_unevenly(const CellOutline& outline) const;
-  Bend bend_of(const TargetCell& cell, const CellOutline& outline);
-  void add_area(const TargetCell& cell, const CellOutline& outline, double share,
+  bool look_along_edges(const TargetCell& cell, const CellOutline& outline, CellBends* bends);
+  void cover(const CellOutline& outline, const CellBends* bends, double shift);
+  void lay_over(const TargetCell& cell, const CellOutline& outline, const SmoothShare& smooth,
+                int level, const Shape& shape, GatheredLight* light);
+  void add_area(const CellOutline& outline, const CellBends* bends, const SmoothShare& smooth,
                 GatheredLight* light);
-  bool add_interpolated(const CellOutline& outline, double share, GatheredLight* light);
+  bool add_interpolated(const CellOutline& outline, const CellBends* bends,
+                        const SmoothShare& smooth, GatheredLight* light);
   // Points a texel's side for what was ordered.
   double fineness() const;
-  void add_points(const TargetCell& cell, const CellOutline& outline, double share, int level,
-                  GatheredLight* light);
+  void add_points(const TargetCell& cell, const CellOutline& outline, const CellBends* bends,
+                  const SmoothShare& smooth, int level, GatheredLight* light);
   void add_point(const TargetCell& cell, GatheredLight* light);
   void split(const TargetCell& cell, int level, GatheredLight* light);
   void halve(const TargetCell& cell, bool by_columns, int level, GatheredLight* light);

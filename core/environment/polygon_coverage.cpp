@@ -7,8 +7,9 @@
 // Right of an edge u = X(v) in a texel lies, at height v, the interval [X, 1/2], so that the
 // integrals over v are of
 //   1: 1/2 - X     u: (1/4 - X^2) / 2     v: v (1/2 - X)     u v: v (1/4 - X^2) / 2     v^2: ...
-// All are cubic in v at most, and Simpson's rule is exact. Over the whole width they are 1, 0, v, 0
-// and v^2.
+//   u^2: (1/8 - X^3) / 3
+// All are cubic in v at most, and Simpson's rule is exact. Over the whole width they are 1, 0, v,
+// 0, v^2 and 1/12.
 
 #include "core/environment/polygon_coverage.h"
 
@@ -25,6 +26,7 @@ void add_scaled(const CoveredMoments& moments, double scale, CoveredMoments* sum
   sum->v += scale * moments.v;
   sum->uv += scale * moments.uv;
   sum->vv += scale * moments.vv;
+  sum->uu += scale * moments.uu;
 }
 
 // Right of the edge from (x0, v0) to (x1, v1), both from the texel's centre; height |v1 - v0|.
@@ -41,13 +43,15 @@ CoveredMoments right_of(double x0, double v0, double x1, double v1) {
     sum.v += vs[i] * width;
     sum.uv += vs[i] * first;
     sum.vv += vs[i] * vs[i] * width;
+    sum.uu += width * (0.25 + xs[i] * (0.5 + xs[i])) / 3;
   }
   return sum;
 }
 
 CoveredMoments whole_width(double v0, double v1) {
   const double height = std::abs(v1 - v0);
-  return {height, 0, height * 0.5 * (v0 + v1), 0, height * (v0 * v0 + v0 * v1 + v1 * v1) / 3};
+  return {height,     0, height * 0.5 * (v0 + v1), 0, height * (v0 * v0 + v0 * v1 + v1 * v1) / 3,
+          height / 12};
 }
 
 }  // namespace

@@ -11,10 +11,10 @@ struct GridPoint {
   double x = 0, y = 0;
 };
 
-// Integrals over the covered part of a texel of 1, u, v, u v and v^2, where (u, v) runs from the
-// texel's centre, -1/2 to 1/2.
+// Integrals over the covered part of a texel of 1, u, v, u v, v^2 and u^2, where (u, v) runs from
+// the texel's centre, -1/2 to 1/2.
 struct CoveredMoments {
-  double area = 0, u = 0, v = 0, uv = 0, vv = 0;
+  double area = 0, u = 0, v = 0, uv = 0, vv = 0, uu = 0;
 };
 
 class PolygonCoverage {

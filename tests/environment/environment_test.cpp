@@ -169,7 +169,10 @@ TEST(Environment, HeedsTexelsOnTheBorder) {
   };
   const Environment heeded = make_environment(decoded(map, EnvmapAttribute::latlong));
   EXPECT_EQ(heeded.radiance.width, 128);  // twice as fine: their samples fall between ours
-  EXPECT_LT(worst(heeded), 3e-3);         // the mean over a polar texel is not its centre's value
+  // The mean over a polar texel of height h = 1/64 is not its centre's value: by solid angle its
+  // middle lies at 2/3 h, h/6 further, and weights that keep energy there (RowBlend, k up to 1/2)
+  // move up to k/4 of a row of 1/31: 0.0026 + 0.0040.
+  EXPECT_LT(worst(heeded), 6.6e-3);
   EXPECT_GT(worst(make_environment(decoded(map))), 1e-2);
   // What a client says goes before what the file says.
   const SourceReading reading{.convention = TexelConvention::half_texel};

@@ -401,7 +401,8 @@ TEST(ConvertLayout, EstimatesSmallTargetsFromFewTexels) {
   EXPECT_EQ(looked_at(LayoutKind::latlong, 2), 2);
   EXPECT_EQ(looked_at(LayoutKind::octahedral, 2), 4);
   EXPECT_EQ(looked_at(LayoutKind::octahedral, 8), 16);
-  EXPECT_EQ(looked_at(LayoutKind::octahedral, 64), 256);
+  EXPECT_EQ(looked_at(LayoutKind::octahedral, 64), 1024);
+  EXPECT_EQ(looked_at(LayoutKind::octahedral, 128), 1024);
   EXPECT_EQ(looked_at(LayoutKind::horizontal_cross, 1), 6);
 }
 

@@ -119,12 +119,10 @@ TEST(LayoutTruth, HoldsEveryConversionToItsOrder) {
     const Image source = noise(pair.from);
     const Rotation& rotation = ++k % 2 == 0 ? turn : Rotation{};
     const MapFilter filter = k % 5 == 0 ? MapFilter::area : MapFilter::adaptive;
-    // The promise is for targets of 64 texels a side; 32 are given three times as much.
-    const double room = pair.to.width < 64 || pair.to.height < 64 ? 3 : 1;
     for (const double error : {1e-2, 1e-3}) {
       const Image image = convert(pair.from, source, pair.to, error, filter, rotation);
       const double found = measure(pair, source, image, filter, rotation);
-      EXPECT_LT(found, room * error)
+      EXPECT_LT(found, error)
           << layout_name(pair.from.kind) << " to " << layout_name(pair.to.kind) << " "
           << pair.to.width << ": " << found;
       (error == 1e-2 ? loose_sum : tight_sum) += found;
