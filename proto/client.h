@@ -34,7 +34,7 @@ class DigestMismatch : public Error {
 };
 
 struct ClientOptions {
-  std::string server;           // "http://127.0.0.1:8421"
+  std::string server;           // "http://127.0.0.1:7420"
   std::string token;            // "" = none
   int retries = 5;              // tries after the first
   double first_pause_s = 0.25;  // doubles from try to try up to 8 s, plus up to a quarter at random

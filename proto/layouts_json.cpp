@@ -40,7 +40,10 @@ void write_round_trip(JsonWriter& writer, const RoundTrip& trip) {
 void write_source_layout(JsonWriter& writer, const EnvironmentDocument& document) {
   writer.member("layout", layout_name(document.source_layout.kind));
   write_form(writer, document.source_layout);
-  writer.member("covered_share", document.source_covered_share).key("rotation").begin_array();
+  writer.member("covered_share", document.source_covered_share)
+      .member("conversion_error", document.source_conversion_error)
+      .key("rotation")
+      .begin_array();
   for (const auto& row : document.rotation.rows) {
     writer.begin_array();
     for (const double value : row) writer.value(value);

@@ -133,7 +133,9 @@ struct LightSetDocument {
 };
 
 struct EnvironmentDocument {
-  MapLayout source_layout;          // of the file
+  MapLayout source_layout;  // of the file
+  // What it was brought to a lat-long to, see SourceReading; 0 = it is one.
+  double source_conversion_error = 0;
   double source_covered_share = 1;  // of the sphere; the rest was taken as black
   Rotation rotation;
   int source_width = 0, source_height = 0;

@@ -40,6 +40,14 @@ int bands_of(const MapsOutputs& outputs) {
   return bands;
 }
 
+// Another layout is brought to a lat-long to a tenth of the order, as long as that takes seconds.
+SourceReading reading_for(const Spec& spec, const SourceParameters& parameters) {
+  constexpr double kFinest = 1e-5, kCoarsest = 1e-3;
+  SourceReading reading = environment_reading(*spec.environment, parameters);
+  reading.conversion_error = std::clamp(0.1 * target_error(spec), kFinest, kCoarsest);
+  return reading;
+}
+
 }  // namespace
 
 std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_maps_open(
@@ -51,8 +59,7 @@ std::unique_ptr<EnvironmentMapsState, EnvironmentMapsStateDeleter> environment_m
       grants,
       decoded.format,
       source_warnings(*spec.environment, inputs, parameters.source, decoded),
-      MapsLight(make_pending_environment(std::move(decoded),
-                                         environment_reading(*spec.environment, parameters.source),
+      MapsLight(make_pending_environment(std::move(decoded), reading_for(spec, parameters.source),
                                          rotation_of(parameters.rotation), grants.threads),
                 grants.threads, sun_options(parameters)),
       {}});
@@ -104,8 +111,11 @@ Effect convention_effect(const EnvironmentMapsState& state) {
   const Environment& environment = state.light.environment();
   if (environment.source_layout.convention == TexelConvention::openexr) {
     return {"border_texels", true,
-            "The file's outer pixel centres lie on the borders (OpenEXR's envmap convention): it "
-            "is resampled, twice as fine, to centres at (i + 1/2)/N.",
+            std::string("The file's outer pixel centres lie on the borders (OpenEXR's envmap "
+                        "convention): it ") +
+                "is resampled, twice as fine, to centres at (i + 1/2)/N, to " +
+                short_number(environment.conversion_error) +
+                " of what a texel shows. Bounds are against the map that this gives.",
             std::min(1.0, 0.5 / environment.source_layout.width)};
   }
   return {"border_texels", false, "Texel centres of the file lie at (i + 1/2)/N.", 0};
@@ -120,7 +130,10 @@ Effect layout_effect(const EnvironmentMapsState& state) {
   return {"source_layout", true,
           std::string("The file is read as ") + layout_name(environment.source_layout.kind) +
               " and brought to a lat-long map of " + std::to_string(map.width) + " x " +
-              std::to_string(map.height) + " texels, as fine as its own.",
+              std::to_string(map.height) + " texels, as fine as its own, to " +
+              short_number(environment.conversion_error) +
+              " of what a texel shows. That map is what outputs but layouts are made of, and what "
+              "their bounds are against.",
           1};
 }
 
@@ -366,6 +379,7 @@ Assembly environment_maps_assemble(EnvironmentMapsState& state, const Plan& plan
   document.source_width = environment.source_layout.width;
   document.source_height = environment.source_layout.height;
   document.source_layout = environment.source_layout;
+  document.source_conversion_error = environment.conversion_error;
   document.source_covered_share = environment.covered_share;
   document.rotation = environment.rotation;
   document.source_format = state.format;

@@ -102,13 +102,17 @@ Environment make_environment(DecodedImage decoded, const SourceReading& reading,
     environment.radiance = std::move(image);
   } else {
     Progress silent;
-    environment.radiance =
-        columns ? move_columns(image, *columns)
-                : convert_layout(environment.source_layout, image,
-                                 make_layout(LayoutKind::latlong,
-                                             holding_width(environment.source_layout, turned)),
-                                 rotation, MapFilter::adaptive, threads,
-                                 progress != nullptr ? *progress : silent);
+    if (columns) {
+      environment.radiance = move_columns(image, *columns);
+    } else {
+      const MapLayout& from = environment.source_layout;
+      environment.conversion_error = reading.conversion_error;
+      environment.radiance =
+          convert_layout(ConversionSource(from, image),
+                         make_layout(LayoutKind::latlong, holding_width(from, turned)), rotation,
+                         MapFilter::adaptive, reading.conversion_error, threads,
+                         progress != nullptr ? *progress : silent);
+    }
     environment.source = std::move(image);
   }
   summarise(&environment);

@@ -25,6 +25,8 @@ struct Environment {
   Rotation rotation;         // as ordered
   Rotation pending;          // what of it is still to be applied to all that is made of `radiance`
   double covered_share = 1;  // of the sphere, by the source; the rest is black
+  // What `radiance` was converted to, see SourceReading; 0 = its texels are the file's own.
+  double conversion_error = 0;
 
   // What other layouts are converted from: the file's own pixels, or `radiance` where light has
   // been taken out of it; `source` is then empty.

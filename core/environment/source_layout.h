@@ -20,6 +20,8 @@ struct SourceReading {
   // cube_strip; crosses are the same in either
   FaceOrientation face_orientation = FaceOrientation::openexr;
   bool strict = false;  // refuses pixels that would be repaired
+  // What a map that is brought to a lat-long is converted to: relative rms, see convert_layout().
+  double conversion_error = 1e-3;
 };
 
 // The layout of a file: the one that is said, else the one its `envmap` attribute names, else

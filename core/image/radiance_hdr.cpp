@@ -89,7 +89,8 @@ void multiply_exposure(Header& header, const std::string& text, size_t count) {
   for (size_t c = 0; c < 3; ++c) {
     header.exposure[c] *= values[count == 1 ? 0 : c];
     if (!(header.exposure[c] > 1e-30 && header.exposure[c] < 1e30))
-      malformed("it has an exposure of \"" + printable(text) + "\"; it must be above zero");
+      malformed("it has an exposure of \"" + printable(text) +
+                "\"; their product must lie between 1e-30 and 1e30");
   }
 }
 

@@ -181,6 +181,36 @@ TEST(Environment, HeedsTexelsOnTheBorder) {
 }
 
 // Half of the sphere, and how much of it is not there.
+// Relative to the mean or to what a texel shows, whichever is more, as bounds of conversions are.
+double rms_between(const Environment& a, const Environment& b) {
+  const double mean = luminance(b.mean);
+  double sum = 0;
+  for (size_t i = 0; i < a.radiance.pixels.size(); ++i) {
+    const double shown = std::max(mean, double(b.radiance.pixels[i]));
+    sum += std::pow((double(a.radiance.pixels[i]) - double(b.radiance.pixels[i])) / shown, 2);
+  }
+  return std::sqrt(sum / static_cast<double>(a.radiance.pixels.size()));
+}
+
+TEST(Environment, IsBroughtToALatLongAsExactlyAsItIsRead) {
+  Image strip(24, 144, 3);
+  for (size_t i = 0; i < strip.pixels.size(); ++i)
+    strip.pixels[i] = 0.5f + static_cast<float>(i * 7919 % 101) / 101;
+  SourceReading reading;
+  reading.layout = LayoutKind::cube_strip;
+  const auto read_to = [&](double error) {
+    reading.conversion_error = error;
+    return make_environment(decoded(strip), reading);
+  };
+  const Environment truth = read_to(1e-6), exact = read_to(1e-4), usual = read_to(1e-3);
+  EXPECT_EQ(exact.conversion_error, 1e-4);
+  EXPECT_LE(rms_between(exact, truth), 1e-4);
+  EXPECT_LE(rms_between(usual, truth), 1e-3);
+  // Positive control: the usual one would not pass for the exact one.
+  EXPECT_GT(rms_between(usual, truth), 1e-4);
+  EXPECT_EQ(make_environment(decoded(reference::test_sky(16, 10))).conversion_error, 0);
+}
+
 TEST(Environment, LeavesBlackWhatTheSourceDoesNotCover) {
   Image dome(64, 64, 3);
   for (float& v : dome.pixels) v = 2;

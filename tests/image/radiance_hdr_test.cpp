@@ -127,6 +127,7 @@ TEST(RadianceHdr, RefusesWhatIsNotWellFormed) {
   refuses(file("", "-Y -5 +X 3", ""), "nothing in it");
   refuses(file("EXPOSURE=0\n", "-Y 1 +X 1", red(1)), "exposure");
   refuses(file("EXPOSURE=nan\n", "-Y 1 +X 1", red(1)), "exposure");
+  refuses(file("EXPOSURE=1e38\n", "-Y 1 +X 1", red(1)), "between 1e-30 and 1e30");
   refuses(file("COLORCORR=1 2\n", "-Y 1 +X 1", red(1)), "exposure");
   refuses(file("PRIMARIES=1 2 3\n", "-Y 1 +X 1", red(1)), "primaries");
   refuses(file("", "-Y 1 +X 9", repeat(9)), "begins with a repetition");

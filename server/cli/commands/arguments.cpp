@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kFooter =
     "\nExamples:\n"
     "  kiln bake order.json -o results          bake on this machine, nothing else running\n"
-    "  kiln bake order.json -o results --server http://farm:8421\n"
+    "  kiln bake order.json -o results --server http://farm:7420\n"
     "  kiln plan order.json                     effects with reasons, and what each error costs\n"
     "  kiln view results/sky.exr -o sky.png\n"
     "\nExit codes: 0 succeeded, 1 failed, 2 usage, 3 order refused, 4 token, 5 cancelled,\n"
