@@ -42,9 +42,9 @@ int bands_of(const MapsOutputs& outputs) {
 
 // Another layout is brought to a lat-long to a tenth of the order, as long as that takes seconds.
 SourceReading reading_for(const Spec& spec, const SourceParameters& parameters) {
-  constexpr double kFinest = 1e-5, kCoarsest = 1e-3;
+  constexpr double kFinest = 1e-5;
   SourceReading reading = environment_reading(*spec.environment, parameters);
-  reading.conversion_error = std::clamp(0.1 * target_error(spec), kFinest, kCoarsest);
+  reading.conversion_error = std::clamp(0.1 * target_error(spec), kFinest, kConversionError);
   return reading;
 }
 

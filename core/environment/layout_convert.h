@@ -42,7 +42,7 @@ struct ConversionSource {
   double mean = 0;  // luminance over what the layout covers
 };
 
-// Of an environment that is read.
+// Of an environment that is read, unless it is asked for more exactly.
 inline constexpr double kConversionError = 1e-3;
 
 // Texels are only moved: equal layouts, or cube layouts of one face size and convention, unturned.

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "core/environment/layout_convert.h"
 #include "core/environment/lookup_cube.h"
 #include "core/image/exr.h"
 #include "core/sphere/map_layout.h"
@@ -21,7 +22,7 @@ struct SourceReading {
   FaceOrientation face_orientation = FaceOrientation::openexr;
   bool strict = false;  // refuses pixels that would be repaired
   // What a map that is brought to a lat-long is converted to: relative rms, see convert_layout().
-  double conversion_error = 1e-3;
+  double conversion_error = kConversionError;
 };
 
 // The layout of a file: the one that is said, else the one its `envmap` attribute names, else
